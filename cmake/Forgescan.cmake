@@ -1,0 +1,60 @@
+# House rules of the build in one place: language, warnings, sanitizers, and the three kinds of target.
+set(CMAKE_CXX_STANDARD 20)
+set(CMAKE_CXX_STANDARD_REQUIRED ON)
+set(CMAKE_CXX_EXTENSIONS OFF)
+set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin)
+if(NOT CMAKE_BUILD_TYPE)
+  set(CMAKE_BUILD_TYPE Release)
+endif()
+
+find_program(CCACHE ccache)
+if(CCACHE)
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${CCACHE})
+endif()
+
+set(FORGESCAN_SANITIZE "" CACHE STRING "Sanitizers, as in -fsanitize=")
+set(FORGESCAN_WARNINGS -Wall -Wextra -Wconversion -Wshadow -Wnon-virtual-dtor -Werror)
+
+add_library(forgescan_options INTERFACE)
+target_compile_options(forgescan_options INTERFACE ${FORGESCAN_WARNINGS} -fno-math-errno)
+target_include_directories(forgescan_options INTERFACE ${CMAKE_SOURCE_DIR})
+if(FORGESCAN_SANITIZE)
+  target_compile_options(forgescan_options INTERFACE -fsanitize=${FORGESCAN_SANITIZE}
+                         -fno-omit-frame-pointer -fno-sanitize-recover=all)
+  target_link_options(forgescan_options INTERFACE -fsanitize=${FORGESCAN_SANITIZE})
+endif()
+
+# forgescan_library(NAME SOURCES... DEPS targets...): a library; includes are written from the repository's root.
+function(forgescan_library name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;DEPS;PRIVATE_DEPS" ${ARGN})
+  add_library(${name} STATIC ${ARG_SOURCES})
+  target_link_libraries(${name} PUBLIC forgescan_options ${ARG_DEPS} PRIVATE ${ARG_PRIVATE_DEPS})
+endfunction()
+
+# forgescan_program(NAME SOURCES... DEPS targets...): an executable in <build>/bin.
+function(forgescan_program name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;DEPS" ${ARGN})
+  add_executable(${name} ${ARG_SOURCES})
+  target_link_libraries(${name} PRIVATE forgescan_options ${ARG_DEPS})
+endfunction()
+
+# forgescan_test(NAME SOURCES... DEPS targets... [NETWORK]): one GoogleTest program = one ctest entry. Paths reach the test
+# as FORGESCAN_SOURCE_DIR (the repository) and FORGESCAN_BIN_DIR (programs). NETWORK gives it a network namespace of its own
+# with loopback and LCM's multicast route, so that such tests run in parallel and need no host settings.
+function(forgescan_test name)
+  cmake_parse_arguments(ARG "NETWORK" "TIMEOUT" "SOURCES;DEPS" ${ARGN})
+  add_executable(${name} ${ARG_SOURCES})
+  target_link_libraries(${name} PRIVATE forgescan_options ${ARG_DEPS} GTest::gtest GTest::gmock GTest::gtest_main)
+  target_compile_definitions(${name} PRIVATE FORGESCAN_SOURCE_DIR="${CMAKE_SOURCE_DIR}"
+                             FORGESCAN_BIN_DIR="${CMAKE_BINARY_DIR}/bin")
+  set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/tests)
+  if(ARG_NETWORK)
+    add_test(NAME ${name} COMMAND ${CMAKE_SOURCE_DIR}/tools/with-network $<TARGET_FILE:${name}>)
+  else()
+    add_test(NAME ${name} COMMAND ${name})
+  endif()
+  if(NOT ARG_TIMEOUT)
+    set(ARG_TIMEOUT 120)
+  endif()
+  set_tests_properties(${name} PROPERTIES TIMEOUT ${ARG_TIMEOUT})
+endfunction()

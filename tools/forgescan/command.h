@@ -1,0 +1,13 @@
+// The subcommands of the forgescan tool. Each Add...Command adds itself to the program; when the user calls it, its outcome
+// is stored, and main() turns it into the exit code: 0 only for a trustworthy result.
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+#include "services/common/result.h"
+
+namespace forgescan {
+
+void AddReconstructCommand(CLI::App& app, Status& outcome);
+
+}  // namespace forgescan
