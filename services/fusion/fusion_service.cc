@@ -21,8 +21,10 @@ FusionService::FusionService(StreamHub& hub, ServiceMonitor& monitor, FusionConf
   hub_.Advertise(kFusedCloud);
   hub_.Advertise(kFusionResult);
   hub_.Advertise(kFusionTime);
-  hub_.Subscribe<fsmsg::part_arrived_t>(
-      kPartArrived, [this](const auto& arrived) { Part(arrived.part).OnArrived(arrived); });
+  hub_.Subscribe<fsmsg::part_arrived_t>(kPartArrived, [this](const auto& arrived) {
+    Part(arrived.part).OnArrived(arrived);
+    FinishIfSettled(arrived.part);
+  });
   hub_.Subscribe<fsmsg::view_result_t>(kViewResult, [this](const auto& result) {
     Part(result.part).OnViewResult(result);
     FinishIfSettled(result.part);
