@@ -31,9 +31,12 @@ Status Attempt(const std::string& address, const char* what, const std::function
   }
   // A camera that does not answer, or that another host controls, may do so later; a refused setting stays
   // refused.
-  const bool may_recover = error->code == ARV_DEVICE_ERROR_TIMEOUT ||
-                           error->code == ARV_DEVICE_ERROR_NOT_CONTROLLER ||
-                           error->code == ARV_DEVICE_ERROR_NOT_CONNECTED;
+  const bool may_recover =
+      g_error_matches(error, ARV_DEVICE_ERROR, ARV_DEVICE_ERROR_TIMEOUT) ||
+      g_error_matches(error, ARV_DEVICE_ERROR, ARV_DEVICE_ERROR_NOT_FOUND) ||
+      g_error_matches(error, ARV_DEVICE_ERROR, ARV_DEVICE_ERROR_NOT_CONNECTED) ||
+      g_error_matches(error, ARV_DEVICE_ERROR, ARV_DEVICE_ERROR_NOT_CONTROLLER) ||
+      g_error_matches(error, ARV_DEVICE_ERROR, ARV_DEVICE_ERROR_PROTOCOL_ERROR_ACCESS_DENIED);
   const std::string reason = error->message;
   g_error_free(error);
   return Fail(may_recover ? ErrorCode::kUnavailable : ErrorCode::kProtocol, "camera {}: cannot {}: {}",
@@ -53,6 +56,9 @@ Status AravisSession::Open() {
   }));
   if (!camera_ || !arv_camera_is_gv_device(camera_.get())) {
     return Fail(ErrorCode::kProtocol, "camera {}: not a GigE Vision device", options_.address);
+  }
+  if (!arv_gv_device_is_controller(ARV_GV_DEVICE(arv_camera_get_device(camera_.get())))) {
+    return Fail(ErrorCode::kUnavailable, "camera {}: another host controls it", options_.address);
   }
   g_signal_connect(arv_camera_get_device(camera_.get()), "control-lost", G_CALLBACK(OnControlLost), this);
   RETURN_IF_ERROR(ConfigureImage());
@@ -176,8 +182,9 @@ void AravisSession::PopLoop() {
       continue;
     }
     queue_.Push(id_, Convert(buffer));
-    arv_buffer_set_timestamp(buffer,
-                             0);  // so that a frame without its leader does not show an older frame's time
+    // So that a frame whose first packet is lost does not show the id and time of an older frame.
+    arv_buffer_set_timestamp(buffer, 0);
+    arv_buffer_set_frame_id(buffer, 0);
     arv_stream_push_buffer(stream_.get(), buffer);
   }
 }

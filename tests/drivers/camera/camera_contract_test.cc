@@ -130,7 +130,7 @@ TEST_P(CameraContract, IncompleteFrameIsDeliveredAsSuchAndTheNextIsWhole) {
   ASSERT_TRUE(Receive(3));
   ExpectFrame(0, 1, 0);
   EXPECT_FALSE(frames_[1].complete);
-  EXPECT_EQ(frames_[1].frame_id, 2U);
+  EXPECT_TRUE(frames_[1].frame_id == 2 || frames_[1].frame_id == 0) << frames_[1].frame_id;  // 0 = UNKNOWN
   EXPECT_TRUE(frames_[1].pixels.empty());
   ExpectFrame(2, 3, 2);
   EXPECT_EQ(rig_->camera().counters().frames_incomplete, 1U);

@@ -117,6 +117,9 @@ ControlServer::Reply ControlServer::Answer(const GvcpCommand& command, const Pee
     case GvcpOperation::kWriteMemory:
       return WriteMemory(command, peer);
     case GvcpOperation::kPacketResend: {
+      if ((registers_.Get(reg::kGvcpCapability) & kCapabilityResend) == 0) {
+        return {GvcpStatus::kNotImplemented, {}};
+      }
       const auto request = ParseResendRequest(command);
       if (!request.ok()) {
         return {GvcpStatus::kInvalidParameter, {}};

@@ -92,8 +92,7 @@ void RegisterFile::Reset() {
   SetText(reg::kXmlUrl, 512, fmt::format("Local:camera.xml;{:x};{:x}", reg::kXml, xml_.size()));
   Put(reg::kInterfaceCount, 1);
   Put(reg::kStreamCount, 1);
-  constexpr std::uint32_t kWriteMemory = 1U << 1, kPacketResend = 1U << 2;
-  Put(reg::kGvcpCapability, kWriteMemory | (offers_resend_ ? kPacketResend : 0U));
+  Put(reg::kGvcpCapability, kCapabilityWriteMemory | (offers_resend_ ? kCapabilityResend : 0U));
   Put(reg::kHeartbeatTimeout, kDefaultHeartbeat_ms);
   Put(reg::kTickFrequencyLow, kTickFrequency_hz);
   Put(reg::kStreamPacketSize, kDefaultPacketSize_bytes);

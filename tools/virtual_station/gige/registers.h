@@ -41,6 +41,8 @@ inline constexpr std::uint32_t kXml = 0x10000;         // the description starts
 
 inline constexpr std::uint32_t kDiscovery_bytes = 0xf8;  // the first registers are the discovery answer
 inline constexpr std::uint32_t kFireTestPacket = 1U << 31;
+inline constexpr std::uint32_t kCapabilityWriteMemory = 1U << 1;
+inline constexpr std::uint32_t kCapabilityResend = 1U << 2;
 inline constexpr std::uint32_t kPrivilegeMask = 0x3;  // exclusive or control
 
 struct DeviceIdentity {
