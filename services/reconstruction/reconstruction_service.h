@@ -5,6 +5,8 @@
 #include <memory>
 #include <utility>
 
+#include "fsmsg/view_result_t.hpp"
+#include "services/common/config/config.h"
 #include "services/common/service/service_monitor.h"
 #include "services/reconstruction/reconstruct.h"
 #include "services/reconstruction/view_collector.h"
