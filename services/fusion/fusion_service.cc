@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "services/common/bus/channels.h"
+#include "services/common/service/step_timer.h"
 
 namespace forgescan {
 namespace {
@@ -100,7 +101,7 @@ std::string FusionService::VoidReason(const PartCollector& collector,
 }
 
 void FusionService::Finish(int part, PartCollector& collector) {
-  const std::int64_t start_us = hub_.bus().NowUs();
+  const StepTimer timer(hub_, "fusion", part, kAllViews);
   PartCollector::Views views = collector.TakeViews();
   fsmsg::fusion_result_t result{};
   result.utime = views.last_utime;
@@ -128,15 +129,7 @@ void FusionService::Finish(int part, PartCollector& collector) {
   result.views = std::move(views.summary);
   result.view_count = static_cast<std::int32_t>(result.views.size());
   Publish(std::move(result), cloud);
-  fsmsg::processing_time_t time{};
-  time.utime = hub_.bus().NowUs();
-  time.step = "fusion";
-  time.part = part;
-  time.view = kAllViews;
-  time.duration_us = time.utime - start_us;
-  if (const Status sent = hub_.Publish(kFusionTime, time); !sent.ok()) {
-    monitor_.ReportError(sent.error());
-  }
+  timer.Finish(kFusionTime, monitor_);
 }
 
 void FusionService::Publish(fsmsg::fusion_result_t result, const PointCloud& cloud) {

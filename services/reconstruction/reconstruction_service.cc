@@ -4,6 +4,7 @@
 
 #include "services/common/bus/channels.h"
 #include "services/common/bus/cloud_stream.h"
+#include "services/common/service/step_timer.h"
 #include "services/reconstruction/thin_cloud.h"
 
 namespace forgescan {
@@ -124,7 +125,7 @@ Result<Reconstruction> ReconstructionService::Run(const ViewCollector& view) {
 }
 
 void ReconstructionService::Finish(Key key, const ViewCollector& view) {
-  const std::int64_t start_us = hub_.bus().NowUs();
+  const StepTimer timer(hub_, "reconstruction", key.first, key.second);
   fsmsg::view_result_t result{};
   result.utime = view.middle_utime();
   result.part = key.first;
@@ -148,15 +149,7 @@ void ReconstructionService::Finish(Key key, const ViewCollector& view) {
   if (const Status sent = Publish(result, cloud); !sent.ok()) {
     monitor_.ReportError(sent.error());
   }
-  fsmsg::processing_time_t time{};
-  time.utime = hub_.bus().NowUs();
-  time.step = "reconstruction";
-  time.part = key.first;
-  time.view = key.second;
-  time.duration_us = time.utime - start_us;
-  if (const Status sent = hub_.Publish(kReconstructionTime, time); !sent.ok()) {
-    monitor_.ReportError(sent.error());
-  }
+  timer.Finish(kReconstructionTime, monitor_);
 }
 
 Status ReconstructionService::Publish(const fsmsg::view_result_t& result, const PointCloud& cloud) {
