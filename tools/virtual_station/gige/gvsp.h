@@ -29,6 +29,8 @@ enum class PacketStatus : std::uint16_t { kSuccess = 0x0000, kResent = 0x0100, k
 struct GvspFrame {
   std::uint16_t block_id = 0;
   std::uint64_t timestamp_ns = 0;
+  std::int64_t ready_ns =
+      0;  // end of exposure, CLOCK_MONOTONIC: the first packet leaves then if the port is free
   std::uint32_t width_px = 0;
   std::uint32_t height_px = 0;
   std::shared_ptr<const std::vector<std::uint8_t>> image;

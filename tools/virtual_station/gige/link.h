@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <mutex>
 
 namespace forgescan {
@@ -13,22 +14,26 @@ struct LinkOptions {
   std::size_t buffer_bytes = 512 * 1024;  // what the port can hold while it is busy; more is dropped
 };
 
-// Thread-safe. The buffer drains at the link's rate; a packet is admitted if it fits behind what still waits.
-// Time is the moment at which the packet's first bit would leave the camera, so a late thread does not change
-// what is dropped.
+// Thread-safe. The port serves packets one after the other at the link's rate; a packet is admitted if it
+// fits into the buffer behind what still waits when it arrives. Time is the moment at which the packet would
+// leave its camera by the camera's own schedule, so threads that run late, or overtake each other, do not
+// change what is dropped.
 class Link {
  public:
   explicit Link(LinkOptions options) : options_(options) {}
 
+  // Packets may be offered out of order by up to a second.
   bool Admit(std::int64_t t_mono_ns, std::size_t wire_bytes);
 
   std::uint64_t admitted() const;
   std::uint64_t dropped() const;
 
  private:
+  void Occupy(std::int64_t begin_ns, std::int64_t end_ns);
+
   const LinkOptions options_;
   mutable std::mutex mutex_;
-  std::int64_t free_at_ns_ = 0;  // when all that was admitted will have left
+  std::map<std::int64_t, std::int64_t> busy_ns_;  // begin -> end of the times in which the port sends, apart
   std::uint64_t admitted_ = 0;
   std::uint64_t dropped_ = 0;
 };

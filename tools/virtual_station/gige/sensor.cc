@@ -138,6 +138,7 @@ std::shared_ptr<const GvspFrame> Sensor::MakeFrame(const Exposure& exposure) con
   auto frame = std::make_shared<GvspFrame>();
   frame->block_id = exposure.block_id;
   frame->timestamp_ns = static_cast<std::uint64_t>(exposure.t_mono_ns);
+  frame->ready_ns = exposure.t_mono_ns + settings.exposure_us * 1000;
   frame->width_px = settings.width_px;
   frame->height_px = settings.height_px;
   frame->image = Crop(std::move(image), settings, options_.width_px);

@@ -13,6 +13,9 @@ namespace {
 
 constexpr std::size_t kBatch_packets = 32;
 constexpr std::int64_t kBatch_ns = 500'000;  // packets due within this time go out together
+// A thread that the system woke late sends what is due at once and is back on the camera's schedule. Beyond
+// this, a burst would overrun a receiver that a real camera would not: then the frame simply starts late.
+constexpr std::int64_t kCatchUp_ns = 20'000'000;
 constexpr std::size_t kMemory_frames = 4;
 constexpr std::size_t kHistory_frames = 8;
 
@@ -109,7 +112,10 @@ bool Transmitter::StartFrame() {
   active_ = std::move(waiting_.front());
   waiting_.pop_front();
   next_packet_ = 0;
-  port_free_ns_ = std::max(port_free_ns_, MonoNowNs());
+  const std::int64_t now_ns = MonoNowNs();
+  const bool late = active_->ready_ns < now_ns - kCatchUp_ns;
+  counters_.frames_late += late ? 1U : 0U;
+  port_free_ns_ = std::max(port_free_ns_, late ? now_ns : active_->ready_ns);
   history_.push_back(active_);
   if (history_.size() > kHistory_frames) {
     history_.pop_front();

@@ -25,7 +25,9 @@ struct TransmitterOptions {
 
 struct TransmitterCounters {
   std::uint64_t frames = 0;
-  std::uint64_t packets = 0;          // given to the system
+  std::uint64_t frames_late =
+      0;                      // began more than 20 ms after the end of exposure, off the camera's schedule
+  std::uint64_t packets = 0;  // given to the system
   std::uint64_t packets_lost = 0;     // by the fault knob
   std::uint64_t packets_refused = 0;  // by the shared link
   std::uint64_t packets_failed = 0;   // by the system
