@@ -8,10 +8,10 @@
 namespace forgescan {
 namespace {
 
-constexpr int kTile = 16;             // px, side of the squares that are skipped if they see nothing
-constexpr double kDepthStepMm = 2.0;  // between neighbours: an outline
-constexpr double kNearestMm = 50.0;   // nothing of the scene comes closer to a camera
-constexpr double kWidestSlope = 1.5;  // beyond, the lens model folds back; far outside every image
+constexpr int kTile = 16;              // px, side of the squares that are skipped if they see nothing
+constexpr double kOutlineSlope = 8.0;  // depth step between neighbours, in pixel widths: 83 deg of tilt
+constexpr double kNearestMm = 50.0;    // nothing of the scene comes closer to a camera
+constexpr double kWidestSlope = 1.5;   // beyond, the lens model folds back; far outside every image
 
 // A traced point and what the camera gets from it.
 struct Traced {
@@ -184,7 +184,7 @@ class Mapper {
     const bool lit_a = map_.sample[a].lit > 0.0f;
     const bool lit_b = map_.sample[b].lit > 0.0f;
     return map_.surface[a] != map_.surface[b] || lit_a != lit_b ||
-           std::abs(depth_mm_[a] - depth_mm_[b]) > kDepthStepMm;
+           std::abs(depth_mm_[a] - depth_mm_[b]) * camera_.lens.fx_px > kOutlineSlope * depth_mm_[a];
   }
 
   // Outline pixels get four samples a quarter pixel from their centre.
