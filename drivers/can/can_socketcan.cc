@@ -18,6 +18,8 @@
 namespace forgescan {
 namespace {
 
+constexpr int kMaxFramesPerDrain = 4096;  // a babbling station must not hold the caller for ever
+
 can_frame ToKernel(const CanFrame& frame) {
   can_frame raw{};
   raw.can_id = frame.id | (frame.extended ? CAN_EFF_FLAG : 0U) | (frame.rtr ? CAN_RTR_FLAG : 0U);
@@ -182,7 +184,7 @@ Result<std::optional<CanFrame>> SocketCan::Read() {
 }
 
 Status SocketCan::Drain() {
-  for (;;) {
+  for (int count = 0; count < kMaxFramesPerDrain; ++count) {
     ASSIGN_OR_RETURN(const auto frame, Read());
     if (!frame) {
       return {};
@@ -192,6 +194,7 @@ Status SocketCan::Drain() {
     }
     Deliver(*frame);
   }
+  return {};
 }
 
 }  // namespace

@@ -16,6 +16,7 @@ namespace {
 
 constexpr int kReceiveBufferBytes = 1 << 20;  // some thousand frames, against a stalled reader
 constexpr std::size_t kMaxDatagramBytes = 2048;
+constexpr int kMaxFramesPerDrain = 4096;  // a babbling station must not hold the caller for ever
 
 sockaddr_in AddressOf(in_addr host, std::uint16_t port) {
   sockaddr_in address{};
@@ -115,7 +116,7 @@ Status UdpCan::Send(const CanFrame& frame) {
 
 Status UdpCan::Drain() {
   std::array<std::uint8_t, kMaxDatagramBytes> buffer;
-  for (;;) {
+  for (int count = 0; count < kMaxFramesPerDrain; ++count) {
     sockaddr_in sender{};
     socklen_t size = sizeof(sender);
     const ssize_t got =
@@ -135,6 +136,7 @@ Status UdpCan::Drain() {
     frame->utime = now_us_();
     Deliver(*frame);
   }
+  return {};
 }
 
 }  // namespace
