@@ -1,4 +1,5 @@
-// Work split into blocks of fixed size, so that a sum taken block by block is the same bytes for any number of threads.
+// Work split into blocks of fixed size, so that a sum taken block by block is the same bytes for any number
+// of threads.
 #pragma once
 
 #include <algorithm>
@@ -14,9 +15,9 @@ inline std::size_t BlockCount(std::size_t count, std::size_t block_size) {
   return (count + block_size - 1) / block_size;
 }
 
-// Calls work(block, begin, end) once for every block of [0, count), from up to `threads` threads (0 = as many as the host
-// has). Which thread takes which block is left open; the blocks themselves depend on count and block_size only.
-// `work` must not throw and must write to places of its own block only.
+// Calls work(block, begin, end) once for every block of [0, count), from up to `threads` threads (0 = as many
+// as the host has). Which thread takes which block is left open; the blocks themselves depend on count and
+// block_size only. `work` must not throw and must write to places of its own block only.
 template <typename Work>
 void ForEachBlock(std::size_t count, std::size_t block_size, unsigned threads, const Work& work) {
   const std::size_t blocks = BlockCount(count, block_size);

@@ -11,9 +11,10 @@ constexpr std::size_t kLeafSize = 4;
 // Two triangles that share the nearest edge give distances that differ by rounding only.
 constexpr float kTie = 1e-5F;
 
-// Nearest point to p of the triangle a + s ab + t ac (regions of the plane as in Ericson, Real-Time Collision Detection, 5.1.5).
-Eigen::Vector3f NearestOnTriangle(const Eigen::Vector3f& p, const Eigen::Vector3f& a, const Eigen::Vector3f& ab,
-                                  const Eigen::Vector3f& ac) {
+// Nearest point to p of the triangle a + s ab + t ac (regions of the plane as in Ericson, Real-Time Collision
+// Detection, 5.1.5).
+Eigen::Vector3f NearestOnTriangle(const Eigen::Vector3f& p, const Eigen::Vector3f& a,
+                                  const Eigen::Vector3f& ab, const Eigen::Vector3f& ac) {
   const Eigen::Vector3f ap = p - a;
   const float d1 = ab.dot(ap), d2 = ac.dot(ap);
   if (d1 <= 0 && d2 <= 0) return a;
@@ -36,7 +37,8 @@ Eigen::Vector3f NearestOnTriangle(const Eigen::Vector3f& p, const Eigen::Vector3
   return a + ab * (vb * scale) + ac * (vc * scale);
 }
 
-float SquaredDistanceToBox(const Eigen::Vector3f& p, const Eigen::Vector3f& low, const Eigen::Vector3f& high) {
+float SquaredDistanceToBox(const Eigen::Vector3f& p, const Eigen::Vector3f& low,
+                           const Eigen::Vector3f& high) {
   return (low - p).cwiseMax(p - high).cwiseMax(0.0F).squaredNorm();
 }
 
@@ -46,7 +48,8 @@ struct TriangleIndex::Best {
   float squared;  // nothing at or beyond this distance is of interest
   std::uint32_t slot = kNoTriangle;
   Eigen::Vector3f foot = Eigen::Vector3f::Zero();
-  float off_plane = -1;  // |component of (point - foot) along the normal|: decides between triangles that share an edge
+  float off_plane =
+      -1;  // |component of (point - foot) along the normal|: decides between triangles that share an edge
 };
 
 Result<TriangleIndex> TriangleIndex::Build(const std::vector<Eigen::Vector3f>& vertices,
@@ -95,7 +98,8 @@ void TriangleIndex::BuildNode(std::size_t begin, std::size_t end, std::vector<Ei
     spread.extend(centroids[c.triangle]);
   }
   const std::size_t self = nodes_.size();
-  nodes_.push_back({box.min(), static_cast<std::uint32_t>(begin), box.max(), static_cast<std::uint32_t>(end - begin)});
+  nodes_.push_back(
+      {box.min(), static_cast<std::uint32_t>(begin), box.max(), static_cast<std::uint32_t>(end - begin)});
   if (end - begin <= kLeafSize) return;
   Eigen::Index axis = 0;
   spread.sizes().maxCoeff(&axis);
@@ -149,7 +153,8 @@ std::optional<TriangleIndex::Nearest> TriangleIndex::Find(const Eigen::Vector3f&
       VisitLeaf(node, p, best);
       continue;
     }
-    Entry near{entry.node + 1, SquaredDistanceToBox(p, nodes_[entry.node + 1].low, nodes_[entry.node + 1].high)};
+    Entry near{entry.node + 1,
+               SquaredDistanceToBox(p, nodes_[entry.node + 1].low, nodes_[entry.node + 1].high)};
     Entry far{node.first, SquaredDistanceToBox(p, nodes_[node.first].low, nodes_[node.first].high)};
     if (far.squared < near.squared) std::swap(near, far);
     stack[depth++] = far;

@@ -2,21 +2,21 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 #include <cstdint>
 #include <limits>
 #include <optional>
 #include <vector>
 
+#include "services/common/geometry/triangle_mesh.h"
 #include "services/common/result.h"
 
 namespace forgescan {
 
-using TriangleCorners = std::array<std::uint32_t, 3>;  // vertex indices, counter-clockwise seen from outside
+using TriangleCorners = std::array<std::uint32_t, 3>;  // one entry of TriangleMesh::triangles
 
 // Purpose: distances of measured points to the design surface itself, not to samples of it.
-// Shape: any number of triangles >= 1; triangles need not be connected. Units: mm. Frames: that of the vertices.
-// Precision: single precision about the mesh's centre, about 1e-4 mm over a 2 m part.
+// Shape: any number of triangles >= 1; triangles need not be connected. Units: mm. Frames: that of the
+// vertices. Precision: single precision about the mesh's centre, about 1e-4 mm over a 2 m part.
 class TriangleIndex {
  public:
   static constexpr std::uint32_t kNoTriangle = std::numeric_limits<std::uint32_t>::max();
@@ -31,9 +31,13 @@ class TriangleIndex {
   // Triangles without area stay in the index: their edges are still part of the surface.
   static Result<TriangleIndex> Build(const std::vector<Eigen::Vector3f>& vertices,
                                      const std::vector<TriangleCorners>& triangles);
+  static Result<TriangleIndex> Build(const TriangleMesh& mesh) {
+    return Build(mesh.vertices, mesh.triangles);
+  }
 
-  // The nearest point within max_distance_mm, or nothing (also for a point that is not finite). `hint` is a triangle believed
-  // to be near, such as the previous point's: it speeds the search up and does not change the distance.
+  // The nearest point within max_distance_mm, or nothing (also for a point that is not finite). `hint` is a
+  // triangle believed to be near, such as the previous point's: it speeds the search up and does not change
+  // the distance.
   std::optional<Nearest> Find(const Eigen::Vector3f& point, float max_distance_mm,
                               std::uint32_t hint = kNoTriangle) const;
 
@@ -48,7 +52,8 @@ class TriangleIndex {
   };
   struct Node {
     Eigen::Vector3f low;
-    std::uint32_t first;  // leaf: first slot in corners_; inner: index of the right child (the left one follows)
+    std::uint32_t
+        first;  // leaf: first slot in corners_; inner: index of the right child (the left one follows)
     Eigen::Vector3f high;
     std::uint32_t count;  // triangles of a leaf, 0 for an inner node
   };

@@ -32,7 +32,8 @@ void PutArray(std::string& bytes, const std::vector<T>& values) {
   bytes.append(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T));
 }
 
-// Reads forward through the payload; after the first read past the end, ok() stays false and values stay zero.
+// Reads forward through the payload; after the first read past the end, ok() stays false and values stay
+// zero.
 class Cursor {
  public:
   explicit Cursor(const std::string& bytes, std::size_t at) : bytes_(bytes), at_(at) {}
@@ -105,7 +106,8 @@ Result<ModelFace> TakeFace(Cursor& cursor) {
   ModelFace face;
   face.name = cursor.TakeString();
   const auto type = cursor.Take<std::uint32_t>();
-  if (type > kLastFaceType) return Fail(ErrorCode::kFormat, "the model bundle has a face of unknown type {}", type);
+  if (type > kLastFaceType)
+    return Fail(ErrorCode::kFormat, "the model bundle has a face of unknown type {}", type);
   face.type = static_cast<FaceType>(type);
   face.point = cursor.TakeVector();
   face.direction = cursor.TakeVector();
@@ -129,7 +131,8 @@ Result<ModelBundle> DecodePayload(Cursor& cursor) {
   bundle.triangles = cursor.TakeArray<TriangleCorners>();
   bundle.sample_points = cursor.TakeArray<Eigen::Vector3f>();
   bundle.sample_normals = cursor.TakeArray<Eigen::Vector3f>();
-  if (!cursor.AtEnd()) return Fail(ErrorCode::kFormat, "the model bundle's counts do not add up to its length");
+  if (!cursor.AtEnd())
+    return Fail(ErrorCode::kFormat, "the model bundle's counts do not add up to its length");
   return bundle;
 }
 
@@ -153,7 +156,8 @@ Result<ModelBundle> DecodeBundle(const std::string& bytes) {
   const auto expected_crc = cursor.Take<std::uint32_t>();
   const auto size = cursor.Take<std::uint64_t>();
   if (version != kVersion) {
-    return Fail(ErrorCode::kFormat, "model bundle of version {}, this program reads version {}", version, kVersion);
+    return Fail(ErrorCode::kFormat, "model bundle of version {}, this program reads version {}", version,
+                kVersion);
   }
   if (size != bytes.size() - kHeaderSize) {
     return Fail(ErrorCode::kFormat, "model bundle with {} bytes of payload, its header says {}",
@@ -161,7 +165,8 @@ Result<ModelBundle> DecodeBundle(const std::string& bytes) {
   }
   const std::uint32_t crc = libdeflate_crc32(0, bytes.data() + kHeaderSize, size);
   if (crc != expected_crc) {
-    return Fail(ErrorCode::kFormat, "model bundle is damaged: CRC-32 {:08x}, its header says {:08x}", crc, expected_crc);
+    return Fail(ErrorCode::kFormat, "model bundle is damaged: CRC-32 {:08x}, its header says {:08x}", crc,
+                expected_crc);
   }
   ASSIGN_OR_RETURN(ModelBundle bundle, DecodePayload(cursor));
   bundle.checksum = crc;
@@ -189,7 +194,8 @@ Result<std::string> ReadWholeFile(const std::filesystem::path& path) {
   std::error_code error;
   const std::uintmax_t size = std::filesystem::file_size(path, error);
   if (error) return Fail(ErrorCode::kNotFound, "{}: no such file, or not readable", path.string());
-  if (size > kMaxFileBytes) return Fail(ErrorCode::kFormat, "{}: {} bytes, at most 4 GiB are read", path.string(), size);
+  if (size > kMaxFileBytes)
+    return Fail(ErrorCode::kFormat, "{}: {} bytes, at most 4 GiB are read", path.string(), size);
   std::string bytes(size, '\0');
   std::ifstream file(path, std::ios::binary);
   if (!file.read(bytes.data(), static_cast<std::streamsize>(size))) {

@@ -10,11 +10,12 @@
 
 namespace forgescan {
 
-// Layout, little endian: "FSBUNDLE", u32 version, u32 CRC-32 of the payload, u64 payload bytes, payload (arrays preceded by
-// their u64 count).
+// Layout, little endian: "FSBUNDLE", u32 version, u32 CRC-32 of the payload, u64 payload bytes, payload
+// (arrays preceded by their u64 count).
 std::string EncodeBundle(const ModelBundle& bundle);
 
-// Errors: kFormat for a wrong magic, version, length, checksum or count; kInvalidArgument from Check(ModelBundle).
+// Errors: kFormat for a wrong magic, version, length, checksum or count; kInvalidArgument from
+// Check(ModelBundle).
 Result<ModelBundle> DecodeBundle(const std::string& bytes);
 
 // Writes beside the target and renames, so that no half file is ever seen under its name. Errors: kIo.

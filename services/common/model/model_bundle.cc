@@ -8,21 +8,23 @@
 namespace forgescan {
 namespace {
 
-constexpr double kUnitTolerance = 1e-3;  // a direction's length; float files keep 1e-7, hand-written ones fewer digits
+constexpr double kUnitTolerance =
+    1e-3;  // a direction's length; float files keep 1e-7, hand-written ones fewer digits
 
 Status CheckFace(const ModelBundle& bundle, std::size_t i, std::uint32_t expected_first) {
   const ModelFace& face = bundle.faces[i];
   if (face.first_triangle != expected_first) {
-    return Fail(ErrorCode::kInvalidArgument, "face {} ('{}') starts at triangle {}, expected {}", i, face.name,
-                face.first_triangle, expected_first);
+    return Fail(ErrorCode::kInvalidArgument, "face {} ('{}') starts at triangle {}, expected {}", i,
+                face.name, face.first_triangle, expected_first);
   }
   if (!face.point.allFinite() || !face.direction.allFinite() || !(face.radius_mm >= 0)) {
-    return Fail(ErrorCode::kInvalidArgument, "face {} ('{}') has parameters that are not finite", i, face.name);
+    return Fail(ErrorCode::kInvalidArgument, "face {} ('{}') has parameters that are not finite", i,
+                face.name);
   }
   const bool needs_direction = face.type == FaceType::kPlane || face.type == FaceType::kCylinder;
   if (needs_direction && std::abs(face.direction.norm() - 1) > kUnitTolerance) {
-    return Fail(ErrorCode::kInvalidArgument, "face {} ('{}') has a direction of length {}, expected 1", i, face.name,
-                face.direction.norm());
+    return Fail(ErrorCode::kInvalidArgument, "face {} ('{}') has a direction of length {}, expected 1", i,
+                face.name, face.direction.norm());
   }
   return {};
 }
@@ -57,7 +59,8 @@ const char* FaceTypeName(FaceType type) {
 
 Status Check(const ModelBundle& bundle) {
   if (bundle.triangles.empty() || bundle.sample_points.empty()) {
-    return Fail(ErrorCode::kInvalidArgument, "the model has {} triangles and {} samples, at least 1 of each is needed",
+    return Fail(ErrorCode::kInvalidArgument,
+                "the model has {} triangles and {} samples, at least 1 of each is needed",
                 bundle.triangles.size(), bundle.sample_points.size());
   }
   if (bundle.sample_points.size() != bundle.sample_normals.size()) {
@@ -74,7 +77,8 @@ Status Check(const ModelBundle& bundle) {
     }
   }
   if (!(bundle.spacing_mm > 0 && bundle.resolution_mm >= 0 && bundle.chord_error_mm >= 0)) {
-    return Fail(ErrorCode::kInvalidArgument, "the model's spacing is {} mm and its resolution {} mm, expected > 0 and >= 0",
+    return Fail(ErrorCode::kInvalidArgument,
+                "the model's spacing is {} mm and its resolution {} mm, expected > 0 and >= 0",
                 bundle.spacing_mm, bundle.resolution_mm);
   }
   return CheckFaces(bundle);

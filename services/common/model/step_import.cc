@@ -3,6 +3,7 @@
 #include <BRepAdaptor_Surface.hxx>
 #include <BRepMesh_IncrementalMesh.hxx>
 #include <BRep_Tool.hxx>
+#include <Eigen/Geometry>
 #include <Message.hxx>
 #include <Message_Messenger.hxx>
 #include <Message_Printer.hxx>
@@ -18,8 +19,6 @@
 #include <Transfer_TransientProcess.hxx>
 #include <XSControl_TransferReader.hxx>
 #include <XSControl_WorkSession.hxx>
-
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <map>
 #include <set>
@@ -165,15 +164,17 @@ Result<ModelBundle> ReadStep(const std::filesystem::path& path, const Tessellati
     return Fail(ErrorCode::kNotFound, "{}: no such file", path.string());
   }
   if (!(options.chord_error_mm > 0) || !(options.angle_rad > 0)) {
-    return Fail(ErrorCode::kInvalidArgument, "a chord error of {} mm and an angle of {} rad, both must be > 0",
-                options.chord_error_mm, options.angle_rad);
+    return Fail(ErrorCode::kInvalidArgument,
+                "a chord error of {} mm and an angle of {} rad, both must be > 0", options.chord_error_mm,
+                options.angle_rad);
   }
   try {
     auto bundle = ReadWithOcct(path, options);
     if (bundle.ok()) return bundle;
     return Fail(bundle.error().code, "{}: {}", path.string(), bundle.error().message);
   } catch (const Standard_Failure& failure) {
-    return Fail(ErrorCode::kFormat, "{}: OpenCASCADE cannot use it: {}", path.string(), failure.GetMessageString());
+    return Fail(ErrorCode::kFormat, "{}: OpenCASCADE cannot use it: {}", path.string(),
+                failure.GetMessageString());
   }
 }
 

@@ -13,11 +13,10 @@ struct TessellationOptions {
   double angle_rad = 0.2;         // largest angle between neighbouring triangles of a curved face
 };
 
-// Every face of every solid or shell becomes one ModelFace with its triangles; names of the file's faces are kept. The samples
-// are left empty: SampleSurface() fills them.
-// Units: mm, whatever unit the file is in. Frames: the file's own.
-// Errors: kNotFound; kFormat for a file OpenCASCADE cannot read or without faces; kDegenerate for a face that cannot be
-// triangulated.
+// Every face of every solid or shell becomes one ModelFace with its triangles; names of the file's faces are
+// kept. The samples are left empty: SampleSurface() fills them. Units: mm, whatever unit the file is in.
+// Frames: the file's own. Errors: kNotFound; kFormat for a file OpenCASCADE cannot read or without faces;
+// kDegenerate for a face that cannot be triangulated.
 Result<ModelBundle> ReadStep(const std::filesystem::path& path, const TessellationOptions& options);
 
 }  // namespace forgescan

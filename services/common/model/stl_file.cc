@@ -6,6 +6,7 @@
 #include <numeric>
 #include <string_view>
 #include <tuple>
+#include <vector>
 
 namespace forgescan {
 namespace {
@@ -15,7 +16,7 @@ constexpr std::size_t kBinaryTriangle = 50;
 
 using Corners = std::vector<Eigen::Vector3f>;  // three per triangle
 
-Result<StlMesh> Weld(const Corners& corners) {
+Result<TriangleMesh> Weld(const Corners& corners) {
   if (corners.empty()) return Fail(ErrorCode::kFormat, "the STL file has no triangles");
   for (std::size_t i = 0; i < corners.size(); ++i) {
     if (!corners[i].allFinite()) return Fail(ErrorCode::kFormat, "STL triangle {} is not finite", i / 3);
@@ -27,7 +28,7 @@ Result<StlMesh> Weld(const Corners& corners) {
   };
   std::sort(order.begin(), order.end(),
             [&](auto i, auto j) { return key(i) < key(j) || (key(i) == key(j) && i < j); });
-  StlMesh mesh;
+  TriangleMesh mesh;
   mesh.triangles.resize(corners.size() / 3);
   for (std::size_t k = 0; k < order.size(); ++k) {
     if (k == 0 || key(order[k]) != key(order[k - 1])) mesh.vertices.push_back(corners[order[k]]);
@@ -81,19 +82,21 @@ Result<Corners> AsciiCorners(const std::string& bytes) {
     if (word != "vertex") continue;
     Eigen::Vector3f v;
     if (!words.NextFloat(v.x()) || !words.NextFloat(v.y()) || !words.NextFloat(v.z())) {
-      return Fail(ErrorCode::kFormat, "STL triangle {} has a corner that is not three numbers", corners.size() / 3);
+      return Fail(ErrorCode::kFormat, "STL triangle {} has a corner that is not three numbers",
+                  corners.size() / 3);
     }
     corners.push_back(v);
   }
   if (!ended || corners.size() % 3 != 0) {
-    return Fail(ErrorCode::kFormat, "the STL text ends after triangle {} without endsolid", corners.size() / 3);
+    return Fail(ErrorCode::kFormat, "the STL text ends after triangle {} without endsolid",
+                corners.size() / 3);
   }
   return corners;
 }
 
 }  // namespace
 
-Result<StlMesh> DecodeStl(const std::string& bytes) {
+Result<TriangleMesh> DecodeStl(const std::string& bytes) {
   std::uint32_t count = 0;
   if (bytes.size() >= kBinaryHeader) std::memcpy(&count, bytes.data() + 80, 4);
   // The length decides, because writers of binary files also begin their comment with "solid".
@@ -104,7 +107,8 @@ Result<StlMesh> DecodeStl(const std::string& bytes) {
     ASSIGN_OR_RETURN(const Corners corners, AsciiCorners(bytes));
     return Weld(corners);
   }
-  return Fail(ErrorCode::kFormat, "neither an ascii STL (no 'solid') nor a binary one ({} bytes do not hold {} triangles)",
+  return Fail(ErrorCode::kFormat,
+              "neither an ascii STL (no 'solid') nor a binary one ({} bytes do not hold {} triangles)",
               bytes.size(), count);
 }
 

@@ -101,8 +101,9 @@ Result<ModelBundle> SampleSurface(ModelBundle bundle, double spacing_mm) {
   for (const auto& t : bundle.triangles) area += AreaVector(bundle, t).norm();
   const double wanted = area / (spacing_mm * spacing_mm);
   if (!(wanted >= 1) || wanted > static_cast<double>(kMaxSamples)) {
-    return Fail(ErrorCode::kInvalidArgument, "a surface of {:.6g} mm2 at {} mm spacing takes {:.3g} samples, allowed 1 to {}",
-                area, spacing_mm, wanted, kMaxSamples);
+    return Fail(ErrorCode::kInvalidArgument,
+                "a surface of {:.6g} mm2 at {} mm spacing takes {:.3g} samples, allowed 1 to {}", area,
+                spacing_mm, wanted, kMaxSamples);
   }
   bundle.sample_points.clear();
   bundle.sample_normals.clear();
