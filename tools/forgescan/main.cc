@@ -12,6 +12,8 @@ int main(int argc, char** argv) {
     forgescan::AddRegisterCommand(app, outcome);
     forgescan::AddFitCommand(app, outcome);
     forgescan::AddModelCommand(app, outcome);
+    forgescan::AddStationCommand(app, outcome);
+    forgescan::AddInspectCommand(app, outcome);
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error);

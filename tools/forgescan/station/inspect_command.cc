@@ -8,9 +8,10 @@
 #include <filesystem>
 
 #include "services/common/bus/channels.h"
+#include "services/common/model/bundle_file.h"
+#include "services/common/model/model_import.h"
 #include "services/common/bus/stream_hub.h"
 #include "tools/forgescan/command.h"
-#include "tools/forgescan/model_import.h"
 #include "tools/forgescan/station/interrupt.h"
 #include "tools/forgescan/station/network.h"
 #include "tools/forgescan/station/station_runner.h"
@@ -152,7 +153,8 @@ Status Prepare(const InspectOptions& options, const fs::path& run) {
                                  options.station, "--cell", options.cell, "--run", run.string()}));
   RETURN_IF_ERROR(prepare.WaitForSuccess());
   ASSIGN_OR_RETURN(const Station station, Station::Load((run / "station").string()));
-  return ImportModel((run / "station" / "model" / "axle.step").string(), station.model, {});
+  ASSIGN_OR_RETURN(const ModelBundle model, LoadModel(run / "station" / "model" / "axle.step", {}));
+  return WriteBundle(model, station.model);
 }
 
 Status Inspect(const InspectOptions& options) {
