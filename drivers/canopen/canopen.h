@@ -61,6 +61,12 @@ struct ObjectAddress {
   auto operator<=>(const ObjectAddress&) const = default;
 };
 
+struct ObjectEntry {
+  std::uint32_t value = 0;
+  std::uint8_t bytes = 4;  // 1..4
+  bool writable = false;
+};
+
 inline constexpr std::uint32_t kAbortUnknownCommand = 0x05040001;
 inline constexpr std::uint32_t kAbortReadOnly = 0x06010002;
 inline constexpr std::uint32_t kAbortNoObject = 0x06020000;

@@ -8,12 +8,6 @@
 
 namespace forgescan::canopen {
 
-struct ObjectEntry {
-  std::uint32_t value = 0;
-  std::uint8_t bytes = 4;  // 1..4
-  bool writable = false;
-};
-
 class CanopenNode {
  public:
   explicit CanopenNode(std::uint8_t node) : node_(node) {}
