@@ -43,7 +43,7 @@ std::vector<cv::Mat> ReadFrames(const std::string& camera, const PatternSet& pat
   return frames;
 }
 
-Result<Reconstruction> Run(const PatternSet& pattern) {
+Result<Reconstruction> RunSet(const PatternSet& pattern) {
   ASSIGN_OR_RETURN(const auto calibration, LoadStereoCalibration(kDirectory / "stereo_params.yaml"));
   return Reconstruct(ReadFrames("L", pattern), ReadFrames("R", pattern), pattern, calibration, {});
 }
@@ -80,8 +80,8 @@ class RealBoard : public ::testing::Test {
 };
 
 TEST_F(RealBoard, TwoIndependentSetsGiveTheSamePlane) {
-  const auto a = Run(EveryThird(1, {4, 4, 4}, Background::kOwn));
-  const auto b = Run(EveryThird(2, {4, 4, 4}, Background::kOwn));
+  const auto a = RunSet(EveryThird(1, {4, 4, 4}, Background::kOwn));
+  const auto b = RunSet(EveryThird(2, {4, 4, 4}, Background::kOwn));
   ASSERT_TRUE(a.ok()) << a.error().message;
   ASSERT_TRUE(b.ok()) << b.error().message;
   EXPECT_GE(a->cloud_in_camera.size(), 550000U);
@@ -105,7 +105,7 @@ TEST_F(RealBoard, TwoIndependentSetsGiveTheSamePlane) {
 }
 
 TEST_F(RealBoard, SaysThatTheProjectorIsNotLinearEnough) {
-  const auto shared = Run(EveryThird(1, {3, 2, 2}, Background::kShared));
+  const auto shared = RunSet(EveryThird(1, {3, 2, 2}, Background::kShared));
   ASSERT_FALSE(shared.ok());
   EXPECT_EQ(shared.error().code, ErrorCode::kUntrusted);
   EXPECT_THAT(shared.error().message, ::testing::HasSubstr("not linear enough for a shared background"));
