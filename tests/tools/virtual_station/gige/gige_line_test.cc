@@ -144,6 +144,9 @@ std::size_t CompleteOnSharedLink(std::int64_t offset_ns) {
   for (const char* address : {"127.0.0.1", "127.0.0.2"}) {
     GigeDeviceConfig config = SmallDevice(address);
     config.link = link;
+    config.image = [image = SharedRigImage(0)](std::uint64_t) {
+      return image;
+    };  // no rendering that could be late
     config.offers_resend = false;
     channels.push_back(Open(config, OptionsFor(config)));
   }
