@@ -135,7 +135,8 @@ Status AravisSession::CreateStream() {
   }
   // packet-request-ratio 1: the default stops repairing a frame once a quarter of it is missing, which a
   // short pause of the host is enough for.
-  g_object_set(stream_.get(), "socket-buffer", ARV_GV_STREAM_SOCKET_BUFFER_AUTO, "packet-resend",
+  g_object_set(stream_.get(), "socket-buffer", ARV_GV_STREAM_SOCKET_BUFFER_FIXED, "socket-buffer-size",
+               static_cast<gint>(options_.socket_buffer_bytes), "packet-resend",
                ARV_GV_STREAM_PACKET_RESEND_ALWAYS, "packet-request-ratio", 1.0, "packet-timeout",
                static_cast<guint>(options_.packet_timeout_ms * 1000), "frame-retention",
                static_cast<guint>(options_.frame_retention_ms * 1000), nullptr);

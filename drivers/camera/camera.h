@@ -30,10 +30,11 @@ struct CameraFrame {
   int width_px = 0;
   int height_px = 0;
   std::vector<std::uint8_t> pixels;  // empty if !complete: part of an image is not an image
-  std::uint64_t frame_id = 0;        // block id of the wire: 16 bit, 65535 is followed by 1; 0 = UNKNOWN, only if !complete
-  std::int64_t device_time_us = 0;   // camera clock at the trigger edge; 0 = UNKNOWN, only if !complete
-  std::int64_t exposure_us = 0;      // what the camera says it exposed; 0 = UNKNOWN, only if !complete
-  bool complete = false;             // every pixel, the id, the time and the exposure arrived
+  std::uint64_t frame_id =
+      0;  // block id of the wire: 16 bit, 65535 is followed by 1; 0 = UNKNOWN, only if !complete
+  std::int64_t device_time_us = 0;  // camera clock at the trigger edge; 0 = UNKNOWN, only if !complete
+  std::int64_t exposure_us = 0;     // what the camera says it exposed; 0 = UNKNOWN, only if !complete
+  bool complete = false;            // every pixel, the id, the time and the exposure arrived
 };
 
 // Everything that was not delivered as a complete frame is in one of these; they never decrease.

@@ -44,6 +44,7 @@ Status CameraAravisOptions::Check() const {
   RETURN_IF_ERROR(InRange("packet_delay_ns", packet_delay_ns, 0, 1'000'000'000));
   RETURN_IF_ERROR(InRange("packet_timeout_ms", packet_timeout_ms, 1, 1000));
   RETURN_IF_ERROR(InRange("frame_retention_ms", frame_retention_ms, 2 * packet_timeout_ms, 60'000));
+  RETURN_IF_ERROR(InRange("socket_buffer_bytes", socket_buffer_bytes, 65'536, 1 << 30));
   RETURN_IF_ERROR(InRange("buffers", buffers, 2, 1000));
   RETURN_IF_ERROR(
       InRange("queue_capacity_frames", static_cast<std::int64_t>(queue_capacity_frames), 1, 100'000));

@@ -27,6 +27,10 @@ struct CameraAravisOptions {
   // trigger; this Aravis then counts from there, so with such cameras it must exceed the longest pause
   // between triggers.
   int frame_retention_ms = 1000;
+  // Of the receive socket; the system caps it at net.core.rmem_max. Too small loses packets whenever this
+  // host pauses; they are asked for again, at the price of packet_timeout_ms. It takes effect at the first
+  // packet, so the first frame after Start() has the system's default (net.core.rmem_default).
+  int socket_buffer_bytes = 32 * 1024 * 1024;
   int buffers = 24;                        // receive buffers: at least one whole sequence of patterns
   std::size_t queue_capacity_frames = 64;  // waiting for Dispatch()
   int teardown_wait_ms = 1000;             // how long Start() waits for an earlier session to be gone
