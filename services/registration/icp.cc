@@ -34,7 +34,12 @@ Status CheckScan(const PointCloud& scan, const Eigen::Isometry3d& start) {
               "the start pose is not a rigid motion (rotation orthonormal to 1e-3, finite)");
 }
 
-StepFrame FrameOf(const RegistrationModel& model) { return {model.center(), model.reach_mm()}; }
+StepFrame FrameOf(const RegistrationModel& model) {
+  const Eigen::Vector3d half = 0.5 * (model.box_high() - model.box_low());
+  // A flat or straight model still needs a lever to scale with.
+  const auto across = [&](int i, int j) { return std::max(std::hypot(half[i], half[j]), 1e-3); };
+  return {model.center(), {across(1, 2), across(2, 0), across(0, 1)}};
+}
 
 // Steps 3 to 7 with the k-d tree of samples, the threshold falling from the start's uncertainty to its floor.
 Result<Progress> AlignCoarse(const ScanSample& sample, const RegistrationModel& model,

@@ -21,15 +21,16 @@ struct Pair {
   float weight;  // 0..1
 };
 
-// Rotations are about `center` and enter the system as reach_mm * angle, so that all six unknowns are mm.
+// Rotations are about `center` and enter the system as reach_mm * angle, so that all six unknowns are mm. One reach per axis
+// (the part's half diagonal across it): a long part turns about its own axis with a short lever.
 struct StepFrame {
   Eigen::Vector3d center;
-  double reach_mm;
+  Eigen::Vector3d reach_mm;
 };
 
 struct PoseStep {
   Eigen::Isometry3d moved_from_before;  // exact rotation, from the exponential map
-  double rotation_mm;                   // angle * reach_mm: the most the rotation moves a point
+  double rotation_mm;                   // angles * reach_mm: the most the rotation moves a point
   double translation_mm;                // of the centre
   double rms_mm;                        // weighted, point to plane, before the step
   double
