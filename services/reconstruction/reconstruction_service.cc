@@ -34,7 +34,6 @@ void Describe(const CameraQuality& left, fsmsg::view_result_t& result) {
       Count(left.pixels, MaskCause::kModulationRatio) + Count(left.pixels, MaskCause::kReference) +
       Count(left.pixels, MaskCause::kUnwrapMargin) + Count(left.pixels, MaskCause::kDisagreement);
   result.modulation_median_dn = left.median_modulation_dn;
-  result.noise_ratio_median = left.median_noise_to_modulation;
   result.consistency_rms_rad = left.trust.disagreement_rad;
 }
 
@@ -141,6 +140,7 @@ void ReconstructionService::Finish(Key key, const ViewCollector& view) {
     result.reason = reconstruction.ok() ? std::string() : reconstruction.error().message;
     if (reconstruction.ok()) {
       Describe(reconstruction->quality.left, result);
+      result.sigma_median_mm = reconstruction->quality.median_sigma_mm;
       cloud = EveryNthPoint(reconstruction->cloud_in_camera, config_.publish_every_nth_point, key.second);
     }
   }

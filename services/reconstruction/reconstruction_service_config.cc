@@ -9,7 +9,7 @@ Result<ReconstructionServiceConfig> ReconstructionServiceConfig::Load(ConfigTabl
   table.Required("gain_dn", core.noise.gain_dn, 0.0, 1.0);
   table.Optional("saturation_fraction", core.saturation_fraction, 0.5, 1.0);
   table.Optional("min_modulation_dn", core.min_modulation_dn, 0.0, 127.0);
-  table.Optional("max_noise_to_modulation", core.max_noise_to_modulation, 0.001, 0.2);
+  table.Optional("max_phase_sigma_rad", core.max_phase_sigma_rad, 0.001, 0.5);
   table.Optional("modulation_ratio_tolerance", core.modulation_ratio_tolerance, 0.01, 1.0);
   table.Optional("max_shared_second_harmonic", core.max_shared_second_harmonic, 0.001, 0.2);
   table.Optional("max_disagreement_rad", core.max_disagreement_rad, 0.01, 1.0);
