@@ -46,19 +46,20 @@ Eigen::Isometry3d ExactMotion(const Vector6& step, const StepFrame& frame) {
 
 }  // namespace
 
-Result<PoseStep> SolveStep(const std::vector<Pair>& pairs, const StepFrame& frame, double min_eigenvalue) {
+Result<PoseStep> SolveStep(const std::vector<Pair>& pairs, const StepFrame& frame, const StepGuard& guard) {
   const NormalEquations sum = Accumulate(pairs, frame);
   if (static_cast<double>(sum.pairs) < kUnknowns) {
     return Fail(ErrorCode::kDegenerate, "{} point pairs are left, a pose needs at least 6", sum.pairs);
   }
   const Eigen::SelfAdjointEigenSolver<Matrix6> eigen(sum.information / sum.weight);
   const double weakest = eigen.eigenvalues()[0];
-  if (!(weakest >= min_eigenvalue)) {
+  if (!(weakest >= guard.min_eigenvalue)) {
     return Fail(ErrorCode::kDegenerate,
                 "the points do not fix the pose: weakest eigenvalue {:.2g}, at least {:.2g} is needed",
-                weakest, min_eigenvalue);
+                weakest, guard.min_eigenvalue);
   }
-  const Matrix6 inverse = eigen.eigenvectors() * eigen.eigenvalues().cwiseInverse().asDiagonal() *
+  const Matrix6 inverse = eigen.eigenvectors() *
+                          (eigen.eigenvalues().array() + guard.damping).inverse().matrix().asDiagonal() *
                           eigen.eigenvectors().transpose() / sum.weight;
   const Vector6 step = -inverse * sum.gradient;
   PoseStep result;
