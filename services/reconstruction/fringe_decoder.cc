@@ -33,23 +33,22 @@ void Store(const StripDecoder& strip, int row, int column, int length, DecodedVi
   }
 }
 
-void Count(const CameraNoise& noise, DecodedView& view) {
+void Count(DecodedView& view) {
   HistogramMedian modulation(0, 256, 4096);
-  HistogramMedian ratio(0, 0.2, 4000);
-  const double level_sigma = std::sqrt(noise.read_noise_dn * noise.read_noise_dn + noise.gain_dn * 128);
+  HistogramMedian sigma(0, 2, 4000);
   for (int row = 0; row < view.cause.rows; ++row) {
     for (int column = 0; column < view.cause.cols; ++column) {
       const std::uint8_t cause = view.cause(row, column);
       ++view.count[cause];
       if (cause == static_cast<std::uint8_t>(MaskCause::kValid)) {
-        modulation.Add(view.modulation_dn(row, column));
-        ratio.Add(level_sigma / view.modulation_dn(row, column));
+        modulation.Add(static_cast<double>(view.modulation_dn(row, column)));
+        sigma.Add(static_cast<double>(view.sigma_px(row, column)));
       }
     }
   }
   if (modulation.total() > 0) {
     view.median_modulation_dn = modulation.Median();
-    view.median_noise_to_modulation = ratio.Median();
+    view.median_sigma_px = sigma.Median();
   }
 }
 
@@ -108,7 +107,7 @@ Result<DecodedView> FringeDecoder::Decode(std::span<const cv::Mat> frames) const
   view.repaired = RepairFringeOrders(
       view, pattern_.frequencies[static_cast<std::size_t>(table_.base)].period_px, config_);
   DropMaskBorder(view, config_);
-  Count(config_.noise, view);
+  Count(view);
   return view;
 }
 

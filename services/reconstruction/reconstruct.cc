@@ -53,7 +53,7 @@ Result<Reconstructor::Camera> Reconstructor::DecodeCamera(std::span<const cv::Ma
   const CameraQuality quality = {.pixels = view->count,
                                  .repaired = view->repaired,
                                  .median_modulation_dn = view->median_modulation_dn,
-                                 .median_noise_to_modulation = view->median_noise_to_modulation,
+                                 .median_sigma_px = view->median_sigma_px,
                                  .trust = *trust};
   return Camera{std::move(view).value(), quality};
 }

@@ -56,7 +56,7 @@ nlohmann::json ToJson(const CameraQuality& quality) {
   return {{"pixels", pixels},
           {"repaired", quality.repaired},
           {"median_modulation_dn", quality.median_modulation_dn},
-          {"median_noise_to_modulation", quality.median_noise_to_modulation},
+          {"median_sigma_px", quality.median_sigma_px},
           {"measured_noise_dn", number(quality.trust.noise_dn)},
           {"disagreement_rad", quality.trust.disagreement_rad},
           {"predicted_disagreement_rad", quality.trust.predicted_disagreement_rad},
