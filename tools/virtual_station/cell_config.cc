@@ -152,6 +152,7 @@ Result<ProjectorLightConfig> ReadProjectorLight(const File& file) {
   light.black_level = s.Number("black_level", {0, 0.1});
   light.blur_px = s.Number("blur_px", {0, 5});
   light.level_sd = s.Number("level_sd", {0, 0.1});
+  light.unambiguous_px = s.Number("unambiguous_px", {320, 10000});
   const Eigen::Vector3d counts = s.Vector3("fringe_counts", {1, 200});
   RETURN_IF_ERROR(s.Finish());
   for (const double count : counts) {

@@ -45,12 +45,14 @@ struct CalibrationErrorConfig {
 };
 
 struct ProjectorLightConfig {
-  double mean_level, amplitude;    // of the sinusoid, fractions of full projector drive; white is 1
-  double second_harmonic_ratio;    // second over first harmonic left after linearisation
-  double black_level;              // light of a dark pixel, fraction of white
-  double blur_px;                  // standard deviation of projector and lens blur, projector px
-  double level_sd;                 // change of total light from pattern to pattern, fraction
-  std::vector<int> fringe_counts;  // over the projector's width, three, the three-step one first
+  double mean_level, amplitude;  // of the sinusoid, fractions of full projector drive; white is 1
+  double second_harmonic_ratio;  // second over first harmonic left after linearisation
+  double black_level;            // light of a dark pixel, fraction of white
+  double blur_px;                // standard deviation of projector and lens blur, projector px
+  double level_sd;               // change of total light from pattern to pattern, fraction
+  double unambiguous_px;  // the beat of the frequencies: wider than the projector, so that its edges are not
+                          // alike
+  std::vector<int> fringe_counts;  // over unambiguous_px; three, the three-step one first
 };
 
 struct SensorConfig {

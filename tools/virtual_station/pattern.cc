@@ -5,11 +5,8 @@
 
 namespace forgescan {
 
-std::vector<Pattern> ProjectedPatterns(const ProjectorLightConfig& light, int projector_width_px,
-                                       PatternSet set) {
-  const auto period = [&](std::size_t i) {
-    return static_cast<double>(projector_width_px) / light.fringe_counts[i];
-  };
+std::vector<Pattern> ProjectedPatterns(const ProjectorLightConfig& light, PatternSet set) {
+  const auto period = [&](std::size_t i) { return light.unambiguous_px / light.fringe_counts[i]; };
   std::vector<Pattern> patterns;
   const auto add = [&](std::size_t frequency, int steps) {
     for (int i = 0; i < steps; ++i) {

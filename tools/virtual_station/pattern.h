@@ -23,8 +23,7 @@ enum class PatternSet {
 
 // In the order of projection. The reduced set has its three-step frequency in the middle, where a slow drift
 // of the light disturbs least, and the reference last.
-std::vector<Pattern> ProjectedPatterns(const ProjectorLightConfig& light, int projector_width_px,
-                                       PatternSet set);
+std::vector<Pattern> ProjectedPatterns(const ProjectorLightConfig& light, PatternSet set);
 
 // Light at projector coordinate u, fraction of white: the pattern after the projector's remaining
 // non-linearity, the lens blur and the black level. Independent of u for white.

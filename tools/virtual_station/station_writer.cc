@@ -42,25 +42,48 @@ Status WriteCalibration(const Rig& rig, const std::string& path) {
   return WriteWholeFile(path, file.releaseAndGetString());
 }
 
-// One [[frequency]] per fringe count, the first of the configuration first; frames are named by their order
-// of projection.
-std::string PatternText(const CellConfig& config, PatternSet set) {
-  const int width = config.rig.projector.width_px;
-  const std::vector<Pattern> patterns = ProjectedPatterns(config.projector_light, width, set);
-  std::string text =
-      fmt::format("projector_width_px = {}\nbackground = \"{}\"\nreference = \"pattern_{:02}.png\"\n", width,
-                  set == PatternSet::kReduced ? "shared" : "own", patterns.size() - 1);
-  for (const int count : config.projector_light.fringe_counts) {
-    const double period = static_cast<double>(width) / count;
-    std::string frames, shifts;
-    for (std::size_t i = 0; i < patterns.size(); ++i) {
-      if (patterns[i].period_px == period) {
-        frames += fmt::format("{}\"pattern_{:02}.png\"", frames.empty() ? "" : ", ", i);
-        shifts += fmt::format("{}{:.1f}", shifts.empty() ? "" : ", ", patterns[i].shift_deg);
-      }
+// First harmonic and mean of a sinusoid as projected, fractions of white.
+struct Sinusoid {
+  double mean, amplitude;
+};
+Sinusoid Measure(const ProjectorLightConfig& light, double period_px) {
+  const auto level = [&](double quarter) {
+    return PatternLevel(light, {period_px, 0.0}, 0.25 * quarter * period_px);
+  };
+  return {0.25 * (level(0) + level(1) + level(2) + level(3)), 0.5 * (level(0) - level(2))};
+}
+
+std::string FrequencyText(const std::vector<Pattern>& patterns, double period_px, double modulation_ratio) {
+  std::string frames, shifts;
+  for (std::size_t i = 0; i < patterns.size(); ++i) {
+    if (patterns[i].period_px == period_px) {
+      const char* comma = frames.empty() ? "" : ", ";
+      frames += fmt::format("{}\"pattern_{:02}.png\"", comma, i);
+      shifts += fmt::format("{}{:.1f}", comma, patterns[i].shift_deg);
     }
-    text += fmt::format("\n[[frequency]]\nperiod_px = {:.17g}\nframes = [{}]\nshifts_deg = [{}]\n", period,
-                        frames, shifts);
+  }
+  return fmt::format(
+      "\n[[frequency]]\nperiod_px = {:.17g}\nframes = [{}]\nshifts_deg = [{}]\nmodulation_ratio = {:.5f}\n",
+      period_px, frames, shifts, modulation_ratio);
+}
+
+// Frequencies in the order of projection, so that the order of listing is the order of the frames.
+std::string PatternText(const CellConfig& config, PatternSet set) {
+  const ProjectorLightConfig& light = config.projector_light;
+  const std::vector<Pattern> patterns = ProjectedPatterns(light, set);
+  const Sinusoid first = Measure(light, patterns.front().period_px);
+  const double white = PatternLevel(light, patterns.back(), 0.0);
+  std::string text = fmt::format(
+      "projector_width_px = {}\nbackground = \"{}\"\nreference = \"pattern_{:02}.png\"\n",
+      config.rig.projector.width_px, set == PatternSet::kReduced ? "shared" : "own", patterns.size() - 1);
+  text += fmt::format("reference_contrast = {:.5f}\n", first.amplitude / (white - first.mean));
+  double last_period_px = 0.0;
+  for (const Pattern& pattern : patterns) {
+    if (pattern.period_px != last_period_px && pattern.period_px != 0.0) {
+      text += FrequencyText(patterns, pattern.period_px,
+                            Measure(light, pattern.period_px).amplitude / first.amplitude);
+    }
+    last_period_px = pattern.period_px;
   }
   return text;
 }

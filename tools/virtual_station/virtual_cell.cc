@@ -65,7 +65,7 @@ Result<GeometryMap> VirtualCell::Map(const PartState& part, const ViewState& vie
 }
 
 std::vector<Pattern> VirtualCell::Patterns(PatternSet set) const {
-  return ProjectedPatterns(config_.projector_light, config_.rig.projector.width_px, set);
+  return ProjectedPatterns(config_.projector_light, set);
 }
 
 std::vector<std::uint8_t> VirtualCell::Image(const GeometryMap& map, const ViewState& view, Side side,
