@@ -4,25 +4,26 @@ namespace forgescan {
 
 Status CoolingConfig::Check() const {
   if (!(warn_degc < stop_degc && stop_degc < power_off_degc && setpoint_degc < warn_degc)) {
-    return Fail(ErrorCode::kInvalidArgument, "cooling: set-point {} < warn {} < stop {} < power off {} degC does not hold",
-                setpoint_degc, warn_degc, stop_degc, power_off_degc);
+    return Fail(ErrorCode::kInvalidArgument,
+                "cooling: set-point {} < warn {} < stop {} < power off {} degC does not hold", setpoint_degc,
+                warn_degc, stop_degc, power_off_degc);
   }
   const bool gains = kp_per_k > 0 && ki_per_k_s > 0 && kff_per_k >= 0 && max_slew_per_s > 0;
   const bool duties = safe_duty >= 0 && safe_duty <= max_duty && max_duty > 0 && max_duty <= 1;
   if (!gains || !duties) {
     return Fail(ErrorCode::kInvalidArgument,
-                "cooling: gains {}, {}, {}, slew {} must be above 0 and duties safe {} <= max {} within 0..1", kp_per_k,
-                ki_per_k_s, kff_per_k, max_slew_per_s, safe_duty, max_duty);
+                "cooling: gains {}, {}, {}, slew {} must be above 0 and duties safe {} <= max {} within 0..1",
+                kp_per_k, ki_per_k_s, kff_per_k, max_slew_per_s, safe_duty, max_duty);
   }
-  if (!(min_difference_k < max_difference_k && min_valid_degc < max_valid_degc && dew_off_margin_k < dew_margin_k)) {
+  if (!(min_difference_k < max_difference_k && min_valid_degc < max_valid_degc &&
+        dew_off_margin_k < dew_margin_k)) {
     return Fail(ErrorCode::kInvalidArgument, "cooling: a lower limit is not below its upper limit");
   }
   return {};
 }
 
-Result<CoolingConfig> CoolingConfig::Load(const ConfigFile& file) {
+Result<CoolingConfig> CoolingConfig::Load(ConfigTable table) {
   CoolingConfig config;
-  ConfigTable table = file.Table("cooling");
   table.Optional("setpoint_degc", config.setpoint_degc, 0, 60);
   table.Optional("kp_per_k", config.kp_per_k, 1e-6, 100);
   table.Optional("ki_per_k_s", config.ki_per_k_s, 1e-6, 100);

@@ -34,7 +34,8 @@ void CoolingController::OnUnit(const CoolingUnitReport& report) {
   }
 }
 
-// The air that leaves the scanner is as warm as its inside. With only the inlet left, the last known difference is added.
+// The air that leaves the scanner is as warm as its inside. With only the inlet left, the last known
+// difference is added.
 void CoolingController::JudgeSensors() {
   const std::string inlet = inlet_check_.Judge(input_->inlet_degc, duty_, input_->utime, config_);
   const std::string outlet = outlet_check_.Judge(input_->outlet_degc, duty_, input_->utime, config_);
@@ -48,13 +49,14 @@ void CoolingController::JudgeSensors() {
   }
   if (outlet.empty() && inlet.empty()) {
     if (difference_k < config_.min_difference_k || difference_k > config_.max_difference_k) {
-      sensor_fault_ = fmt::format("outlet is {:.1f} K above inlet, outside {}..{}", difference_k, config_.min_difference_k,
-                                  config_.max_difference_k);
+      sensor_fault_ = fmt::format("outlet is {:.1f} K above inlet, outside {}..{}", difference_k,
+                                  config_.min_difference_k, config_.max_difference_k);
     } else {
       difference_k_ += kDifferenceMeanWeight * (difference_k - difference_k_);
     }
     // Of two that disagree the warmer one is believed: too much cooling is the smaller harm.
-    inside_degc_ = sensor_fault_.empty() ? input_->outlet_degc : std::max(input_->outlet_degc, input_->inlet_degc);
+    inside_degc_ =
+        sensor_fault_.empty() ? input_->outlet_degc : std::max(input_->outlet_degc, input_->inlet_degc);
   } else if (outlet.empty()) {
     inside_degc_ = input_->outlet_degc;
   } else {
@@ -71,7 +73,8 @@ double CoolingController::Slewed(double wanted, double dt_s) const {
 double CoolingController::Regulate(double dt_s) {
   const double error_k = inside_degc_ - config_.setpoint_degc;
   const bool ambient_known = std::isfinite(input_->ambient_degc);
-  const double feed_forward = ambient_known ? config_.kff_per_k * (input_->ambient_degc - config_.setpoint_degc) : 0;
+  const double feed_forward =
+      ambient_known ? config_.kff_per_k * (input_->ambient_degc - config_.setpoint_degc) : 0;
   const double wanted = config_.kp_per_k * error_k + integral_ + feed_forward;
   const double target = manual_duty_ ? *manual_duty_ : wanted;
   const double applied = Slewed(std::clamp(target, 0.0, DutyLimit()), dt_s);
@@ -80,7 +83,8 @@ double CoolingController::Regulate(double dt_s) {
   return applied;
 }
 
-// The cooler takes at most max_cooling_k (2d - d^2) off the ambient air; the duty that keeps the air above the dew point.
+// The cooler takes at most max_cooling_k (2d - d^2) off the ambient air; the duty that keeps the air above
+// the dew point.
 double CoolingController::DutyLimit() {
   const bool measured = unit_ && unit_->humidity_pct >= 1 && unit_->humidity_pct <= 100;
   const double humidity_pct = measured ? unit_->humidity_pct : config_.assumed_humidity_pct;
@@ -120,19 +124,20 @@ CoolingController::Judgement CoolingController::Judge(std::int64_t now_us) {
     judgement.reason = fmt::format("the scanner is at {:.1f} degC", inside_degc_);
   }
   if (blind_since_us_ && Seconds(now_us - *blind_since_us_) >= config_.blind_stop_s) {
-    judgement = {std::max(level_, Interlock::kStopInspection),
-                 fmt::format("no thermometer of the scanner for {:.0f} s", Seconds(now_us - *blind_since_us_))};
+    judgement = {
+        std::max(level_, Interlock::kStopInspection),
+        fmt::format("no thermometer of the scanner for {:.0f} s", Seconds(now_us - *blind_since_us_))};
   }
   const bool cooler_off = CoolerOff(now_us);
   const bool trouble = !sensor_fault_.empty() || !fresh_ || cooler_off || !link_up_;
   if (trouble && judgement.interlock == Interlock::kClear) {
     judgement.interlock = Interlock::kWarn;
-    judgement.reason = !link_up_   ? "the cooling unit does not answer"
-                       : !fresh_   ? "the temperatures are stale"
+    judgement.reason = !link_up_    ? "the cooling unit does not answer"
+                       : !fresh_    ? "the temperatures are stale"
                        : cooler_off ? (hot_side_latched_ ? "cooler off: its hot side is too hot"
                                        : dew_latched_    ? "cooler off: the air is near its dew point"
                                                          : "cooler off: no air flow")
-                                   : sensor_fault_;
+                                    : sensor_fault_;
   }
   return judgement;
 }

@@ -1,5 +1,5 @@
-// Keeps the scanner at its temperature: PI with feed-forward, anti-windup and slew limit, thermometer checks, interlocks.
-// Pure: events with their time in, command and interlock out.
+// Keeps the scanner at its temperature: PI with feed-forward, anti-windup and slew limit, thermometer checks,
+// interlocks. Pure: events with their time in, command and interlock out.
 #pragma once
 
 #include <optional>
@@ -39,8 +39,8 @@ struct CoolingOutput {
   double inside_degc = 0;  // what is controlled; NaN: unknown
 };
 
-// Events: temperatures, unit report, link change, tick. All are legal at any time; before the first temperatures the interlock
-// is kUnknown and the duty the safe one.
+// Events: temperatures, unit report, link change, tick. All are legal at any time; before the first
+// temperatures the interlock is kUnknown and the duty the safe one.
 class CoolingController {
  public:
   explicit CoolingController(const CoolingConfig& config) : config_(config) {}
@@ -75,9 +75,9 @@ class CoolingController {
   std::optional<double> manual_duty_;
   std::string sensor_fault_;
   bool link_up_ = false;
-  bool fresh_ = false;           // temperatures are not stale
-  double inside_degc_ = 0;       // NaN while no thermometer can be believed
-  double difference_k_ = 0;      // outlet - inlet, slow mean, to go on with one thermometer
+  bool fresh_ = false;       // temperatures are not stale
+  double inside_degc_ = 0;   // NaN while no thermometer can be believed
+  double difference_k_ = 0;  // outlet - inlet, slow mean, to go on with one thermometer
   double integral_ = 0;
   double duty_ = 0;
   Interlock level_ = Interlock::kClear;  // by temperature, with hysteresis

@@ -42,7 +42,8 @@ std::string SensorCheck::Judge(double degc, double duty, std::int64_t utime, con
   }
   if (!(degc >= config.min_valid_degc && degc <= config.max_valid_degc)) {
     has_last_ = false;
-    return fmt::format("reads {:.1f} degC, outside {}..{}", degc, config.min_valid_degc, config.max_valid_degc);
+    return fmt::format("reads {:.1f} degC, outside {}..{}", degc, config.min_valid_degc,
+                       config.max_valid_degc);
   }
   if (!has_last_) {
     low_degc_ = high_degc_ = last_degc_ = degc;

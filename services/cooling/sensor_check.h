@@ -11,8 +11,8 @@ namespace forgescan {
 class SensorCheck {
  public:
   // Takes a reading of the sensor and the duty applied at that time. NaN: the sensor did not answer.
-  // Returns why the reading cannot be believed; empty when it can. After a step the sensor is distrusted until 1 s of readings
-  // without another one.
+  // Returns why the reading cannot be believed; empty when it can. After a step the sensor is distrusted
+  // until 1 s of readings without another one.
   std::string Judge(double degc, double duty, std::int64_t utime, const CoolingConfig& config);
 
  private:
