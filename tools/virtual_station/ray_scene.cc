@@ -28,7 +28,10 @@ struct RayScene::State {
 namespace {
 
 // False if Embree is out of memory.
-bool Attach(RTCDevice device, RTCScene scene, const SurfaceMesh& mesh) {
+bool Attach(RTCDevice device, RTCScene scene, unsigned id, const SurfaceMesh& mesh) {
+  if (mesh.triangles.empty()) {
+    return true;  // nothing to meet
+  }
   RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
   auto* vertex = static_cast<float*>(rtcSetNewGeometryBuffer(
       geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), mesh.vertices.size()));
@@ -49,7 +52,7 @@ bool Attach(RTCDevice device, RTCScene scene, const SurfaceMesh& mesh) {
     }
   }
   rtcCommitGeometry(geometry);
-  rtcAttachGeometry(scene, geometry);
+  rtcAttachGeometryByID(scene, geometry, id);
   rtcReleaseGeometry(geometry);
   return true;
 }
@@ -104,7 +107,7 @@ Result<RayScene> RayScene::Build(std::span<const SurfaceMesh* const> surfaces) {
   rtcSetSceneFlags(state->scene, RTC_SCENE_FLAG_ROBUST);
   int first = 0;
   for (const SurfaceMesh* surface : surfaces) {
-    if (!Attach(state->device, state->scene, *surface)) {
+    if (!Attach(state->device, state->scene, static_cast<unsigned>(state->first_triangle.size()), *surface)) {
       return Fail(ErrorCode::kUnavailable, "Embree has no memory for {} triangles",
                   surface->triangles.size());
     }

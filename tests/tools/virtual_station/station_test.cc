@@ -1,0 +1,93 @@
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "tools/virtual_station/scene.h"
+#include "tools/virtual_station/station_writer.h"
+#include "tools/virtual_station/teaching.h"
+#include "tools/virtual_station/truth.h"
+
+namespace forgescan {
+namespace {
+
+const std::string kCell = std::string(FORGESCAN_SOURCE_DIR) + "/stations/virtual/cell.toml";
+
+CellConfig Config() {
+  auto config = LoadCellConfig(kCell, 8);
+  EXPECT_TRUE(config.ok());
+  return *config;
+}
+
+TEST(Camera, UnprojectInvertsProject) {
+  const Lens lens = Config().rig.left.lens;
+  for (const Eigen::Vector2d& pixel : {Eigen::Vector2d(-0.5, -0.5), {305.5, 255.5}, {150.0, 10.0}}) {
+    EXPECT_LT((Project(lens, Unproject(lens, pixel).homogeneous()) - pixel).norm(), 1e-9);  // px: rounding
+  }
+}
+
+TEST(Teaching, PerfectCalibrationAndMarkersGiveTheTaughtPose) {
+  CellConfig config = Config();
+  config.robot.position_sd_mm = config.robot.rotation_sd_rad = config.robot.marker_sd_mm = 0.0;
+  config.calibration_error = {};
+  const Rig rig = CalibratedRig(config);
+  const auto array_from_camera = TeachViews(config, rig);
+  const Eigen::Isometry3d rig_from_left = rig.left.camera_from_rig.inverse();
+  for (std::size_t i = 0; i < config.views.size(); ++i) {
+    Eigen::Isometry3d left_from_rectified = Eigen::Isometry3d::Identity();
+    left_from_rectified.linear() = Rectify(rig).rectified_from_left.transpose();
+    const Eigen::Isometry3d expected =
+        TaughtRigPose(config.views[i], config.working_distance_mm) * rig_from_left * left_from_rectified;
+    EXPECT_LT((array_from_camera[i].matrix() - expected.matrix()).norm(), 1e-6);  // mm: rounding
+  }
+}
+
+TEST(Teaching, ViewMatricesAreAsGoodAsTheirMarkers) {
+  const CellConfig config = Config();
+  CellConfig perfect = config;
+  perfect.robot.position_sd_mm = perfect.robot.rotation_sd_rad = perfect.robot.marker_sd_mm = 0.0;
+  const Rig rig = CalibratedRig(config);
+  const auto taught = TeachViews(config, rig);
+  const auto ideal = TeachViews(perfect, rig);
+  double worst_mm = 0.0;
+  for (std::size_t i = 0; i < taught.size(); ++i) {
+    const Eigen::Vector3d centre(120.0, 0.0, config.working_distance_mm);
+    worst_mm = std::max(worst_mm, (taught[i] * centre - ideal[i] * centre).norm());
+  }
+  EXPECT_GT(worst_mm, 0.002);
+  EXPECT_LT(worst_mm,
+            0.08);  // mm: 3 sigma of 0.02 (markers), 0.016 (robot's rotation) and 0.009 (its position)
+}
+
+TEST(Scene, WearMakesPlatesSmallerPartByPart) {
+  PartConfig config = Config().part;
+  config.plate_sd_mm = 0.0;
+  const double first = ActualSize(config, 7, 0).left_plate_width_mm;
+  EXPECT_NEAR(ActualSize(config, 7, 9).left_plate_width_mm, first + 9 * config.plate_wear_mm_per_part, 1e-9);
+}
+
+TEST(Station, WritesFilesAndTruth) {
+  const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "virtual_station_test";
+  const CellConfig config = Config();
+  const Status written = WriteStation(config, PatternSet::kReduced, folder.string());
+  ASSERT_TRUE(written.ok()) << written.error().message;
+  for (const char* file : {"calibration/stereo.yaml", "pattern.toml", "views/views.toml", "model/axle.step",
+                           "model/axle.stl", "model/features.toml"}) {
+    EXPECT_TRUE(std::filesystem::is_regular_file(folder / file)) << file;
+  }
+  const VirtualCell cell(config, 1);
+  const auto part = cell.Part(3);
+  ASSERT_TRUE(part.ok());
+  ASSERT_TRUE(WriteTruth(cell, *part, (folder / "truth.json").string()).ok());
+  std::ifstream stream(folder / "truth.json");
+  const auto truth = nlohmann::json::parse(stream);
+  EXPECT_EQ(truth["dimensions"].size(), 5u);
+  EXPECT_DOUBLE_EQ(truth["dimensions"]["total_length"]["value_mm"], part->size.total_length_mm);
+  EXPECT_EQ(truth["views"].size(), config.views.size());
+  EXPECT_FALSE(WriteTruth(cell, *part, "/nowhere/truth.json").ok());
+  std::filesystem::remove_all(folder);
+}
+
+}  // namespace
+}  // namespace forgescan
