@@ -89,7 +89,7 @@ std::string PatternText(const CellConfig& config, PatternSet set) {
 }
 
 std::string ViewsText(const CellConfig& config, const std::vector<Eigen::Isometry3d>& array_from_camera) {
-  std::string text = fmt::format("path_crc32 = {}\nrecorded_temperature_degc = {:.1f}\n",
+  std::string text = fmt::format("path_crc32 = {}\nrecorded_body_degc = {:.1f}\n",
                                  PathCrc32(config.views), kRobotTeachingDegc);
   for (std::size_t view = 0; view < array_from_camera.size(); ++view) {
     text += fmt::format("\n[[view]]\nindex = {}\narray_from_camera = [", view);
