@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <libdeflate.h>
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <iterator>
@@ -298,5 +299,15 @@ ConfigTable ConfigFile::Root() const {
 }
 
 ConfigTable ConfigFile::Table(std::string_view key) const { return Root().Table(key); }
+
+Status ConfigFile::OnlyTables(const std::vector<std::string>& known) const {
+  for (const auto& [key, value] : document_->table) {
+    if (std::find(known.begin(), known.end(), key.str()) == known.end()) {
+      return Fail(ErrorCode::kInvalidArgument, "{}: line {}: unknown table {}; known here: {}", path_,
+                  value.source().begin.line, key.str(), fmt::join(known, ", "));
+    }
+  }
+  return {};
+}
 
 }  // namespace forgescan

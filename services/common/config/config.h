@@ -75,6 +75,8 @@ class ConfigFile {
   ConfigTable Root() const;
   // One table of the file; Finish() on it checks that table only.
   ConfigTable Table(std::string_view key) const;
+  // Error if the file has a top-level key that is not in the list.
+  [[nodiscard]] Status OnlyTables(const std::vector<std::string>& known) const;
 
  private:
   struct Document;

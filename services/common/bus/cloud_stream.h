@@ -1,0 +1,41 @@
+// Point clouds on the bus: cut into slices that one message can carry, and put together again.
+//
+// A point is 30 bytes, little-endian: float32 x y z (mm), float32 nx ny nz, float32 sigma (mm), uint16 view.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <tuple>
+#include <vector>
+
+#include "fsmsg/cloud_slice_t.hpp"
+#include "services/common/geometry/point_cloud.h"
+#include "services/common/result.h"
+
+namespace forgescan {
+
+inline constexpr int kAllViews = -1;
+
+// Slices of at most 4 MB; an empty cloud is one empty slice. `cloud` has normals, sigma_mm and view for every point.
+// Errors: kInvalidArgument (a member is missing).
+Result<std::vector<fsmsg::cloud_slice_t>> SliceCloud(const PointCloud& cloud, std::int64_t utime, int part, int view);
+
+// Collects slices of several clouds at once, in any order.
+class CloudAssembler {
+ public:
+  // The whole cloud when this was its last slice; nothing while slices are missing.
+  // Errors: kFormat (sizes that contradict each other); the cloud's slices so far are dropped then.
+  Result<std::optional<PointCloud>> Add(const fsmsg::cloud_slice_t& slice);
+  // Drops what has come of a part that will not be finished.
+  void Forget(int part);
+
+ private:
+  struct Open {
+    PointCloud cloud;
+    std::vector<bool> have;
+    std::size_t missing = 0;
+  };
+  std::map<std::pair<int, int>, Open> open_;  // part, view
+};
+
+}  // namespace forgescan

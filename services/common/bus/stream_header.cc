@@ -1,0 +1,60 @@
+#include "services/common/bus/stream_header.h"
+
+#include <libdeflate.h>
+
+#include <algorithm>
+#include <array>
+
+namespace forgescan {
+namespace {
+
+constexpr std::size_t kSessionAt = 16, kSequenceAt = 24, kCrcAt = 32;
+
+template <typename Integer>
+void Put(Bytes& message, std::size_t at, Integer value) {
+  for (std::size_t i = 0; i < sizeof value; ++i) {
+    message[at + i] = static_cast<std::uint8_t>(value >> (8 * (sizeof value - 1 - i)));
+  }
+}
+
+template <typename Integer>
+Integer Get(ByteView message, std::size_t at) {
+  std::uint64_t value = 0;
+  for (std::size_t i = 0; i < sizeof(Integer); ++i) {
+    value = value << 8 | message[at + i];
+  }
+  return static_cast<Integer>(value);
+}
+
+std::uint32_t CrcWithoutItself(ByteView message) {
+  constexpr std::array<std::uint8_t, 4> kZero{};
+  std::uint32_t crc = libdeflate_crc32(0, message.data(), kCrcAt);
+  crc = libdeflate_crc32(crc, kZero.data(), kZero.size());
+  const ByteView rest = message.subspan(kStreamHeaderBytes);
+  return rest.empty() ? crc : libdeflate_crc32(crc, rest.data(), rest.size());
+}
+
+}  // namespace
+
+Status StampStreamHeader(Bytes& message, const StreamHeader& header) {
+  if (message.size() < kStreamHeaderBytes) {
+    return Fail(ErrorCode::kInvalidArgument, "a stream message has at least {} bytes, not {}", kStreamHeaderBytes,
+                message.size());
+  }
+  Put(message, kSessionAt, header.session);
+  Put(message, kSequenceAt, header.sequence);
+  Put(message, kCrcAt, CrcWithoutItself(message));
+  return {};
+}
+
+Result<StreamHeader> CheckStreamHeader(ByteView message) {
+  if (message.size() < kStreamHeaderBytes) {
+    return Fail(ErrorCode::kFormat, "{} bytes are too short for a stream message", message.size());
+  }
+  if (Get<std::uint32_t>(message, kCrcAt) != CrcWithoutItself(message)) {
+    return Fail(ErrorCode::kFormat, "a message of {} bytes has a wrong CRC-32", message.size());
+  }
+  return StreamHeader{Get<std::int64_t>(message, kSessionAt), Get<std::int64_t>(message, kSequenceAt)};
+}
+
+}  // namespace forgescan

@@ -1,0 +1,80 @@
+// Reliable, ordered streams of typed messages over a Bus that may lose, duplicate and reorder: sequence numbers, CRC-32,
+// resend on request, bounded give-up. One StreamHub a service; one sender a channel.
+//
+// Why: LCM loses large messages in silence when a kernel buffer is too small or a process is away too long. With the buffers
+// of tools/setup-host resends are rare; with Debian's defaults they carry everything.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <string>
+
+#include "services/common/bus/channel.h"
+#include "services/common/bus/codec.h"
+#include "services/common/bus/stream_receiver.h"
+#include "services/common/bus/stream_sender.h"
+
+namespace forgescan {
+
+class StreamHub {
+ public:
+  StreamHub(Bus& bus, const std::string& sender, const StreamOptions& options = {});
+  StreamHub(const StreamHub&) = delete;
+  StreamHub& operator=(const StreamHub&) = delete;
+  ~StreamHub();
+
+  Bus& bus() { return bus_; }
+  std::int64_t session() const { return sender_.session(); }
+  const StreamCounters& counters() const { return counters_; }
+
+  // Says at once that this service sends on the channel; so a receiver misses nothing from its first message on.
+  template <typename Message>
+  void Advertise(const Channel<Message>& channel) {
+    sender_.Advertise(channel.name);
+  }
+  // session, sequence and crc32 of the message are stamped here. Errors: kInvalidArgument (too large).
+  template <typename Message>
+  Status Publish(const Channel<Message>& channel, const Message& message) {
+    return sender_.Publish(channel.name, Encode(message));
+  }
+  // Every message once, in order. What does not decode is counted, never delivered.
+  template <typename Message>
+  void Subscribe(const Channel<Message>& channel, std::function<void(const Message&)> handler) {
+    Receiver(channel.name).SetHandler([this, handler = std::move(handler)](ByteView bytes) {
+      const Result<Message> message = Decode<Message>(bytes);
+      message.ok() ? handler(*message) : static_cast<void>(++counters_.damaged);
+    });
+  }
+  // Called in the place of messages that were given up, with the first and last sequence number of the hole.
+  template <typename Message>
+  void OnLost(const Channel<Message>& channel, StreamReceiver::LostHandler handler) {
+    Receiver(channel.name).SetLostHandler(std::move(handler));
+  }
+
+ private:
+  StreamReceiver& Receiver(const std::string& channel);
+
+  Bus& bus_;
+  StreamOptions options_;
+  StreamCounters counters_;
+  StreamSender sender_;
+  std::map<std::string, std::unique_ptr<StreamReceiver>> receivers_;
+  Bus::TimerId timer_;
+};
+
+// Periodic state, where only the newest message counts: no sequence, no resend.
+template <typename Message>
+Status PublishState(Bus& bus, const StateChannel<Message>& channel, const Message& message) {
+  return bus.Publish(channel.name, Encode(message));
+}
+// What does not decode is left out: the sender says it again within a second.
+template <typename Message>
+void SubscribeState(Bus& bus, const StateChannel<Message>& channel, std::function<void(const Message&)> handler) {
+  bus.Subscribe(channel.name, [handler = std::move(handler)](ByteView bytes) {
+    if (const Result<Message> message = Decode<Message>(bytes); message.ok()) {
+      handler(*message);
+    }
+  });
+}
+
+}  // namespace forgescan

@@ -1,0 +1,71 @@
+// The receiving half of the resend protocol for one channel: delivers every message once, whole and in order, asks for what
+// is missing, and after a bounded time gives up and says so.
+//
+//          first contact             gap seen                 pieces or message come
+//   idle ----------------> in order ----------> waiting ------------------------------> in order
+//                                                 | no progress for give_up_us, or the sender no longer has it
+//                                                 +-----------> lost handler, then in order behind the hole
+#pragma once
+
+#include <functional>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "fsmsg/resend_piece_t.hpp"
+#include "services/common/bus/bus.h"
+#include "services/common/bus/stream_options.h"
+
+namespace forgescan {
+
+class StreamReceiver {
+ public:
+  using Handler = std::function<void(ByteView)>;
+  using LostHandler = std::function<void(std::int64_t first_sequence, std::int64_t last_sequence)>;
+
+  StreamReceiver(Bus& bus, std::string channel, const StreamOptions& options, StreamCounters& counters);
+
+  void SetHandler(Handler handler) { handler_ = std::move(handler); }
+  void SetLostHandler(LostHandler handler) { lost_handler_ = std::move(handler); }
+
+  void OnMessage(ByteView bytes);
+  void OnPiece(const fsmsg::resend_piece_t& piece);
+  // What the channel's sender says of itself; `first` is the oldest sequence it can still send.
+  void OnStatus(std::int64_t session, std::int64_t first, std::int64_t last);
+  // Asks for what is missing, gives up what is overdue. To be called every few ms.
+  void OnTimer();
+  bool waiting() const { return !waiting_.empty(); }
+
+ private:
+  // A message from `next_` on that has not been delivered.
+  struct Waiting {
+    Bytes bytes;                // whole message, or room for its pieces
+    bool complete = false;
+    bool resent = false;        // pieces of it have come
+    std::vector<bool> pieces;   // which have come; empty = none
+    std::size_t pieces_open = 0;
+    std::int64_t since_us = 0;  // noticed missing, or last progress
+    std::int64_t asked_us = 0;  // 0 = not yet
+  };
+
+  // False: the bytes belong to an older session.
+  bool EnterSession(std::int64_t session, std::int64_t first_sequence_if_joining);
+  void NoteUpTo(std::int64_t last);
+  void Complete(Waiting& waiting, ByteView bytes);
+  void DeliverReady();
+  void GiveUp(std::int64_t before);
+  void Ask(std::int64_t sequence, Waiting& waiting);
+
+  Bus& bus_;
+  std::string channel_;
+  StreamOptions options_;
+  StreamCounters& counters_;
+  Handler handler_;
+  LostHandler lost_handler_;
+  std::int64_t subscribed_us_;
+  std::int64_t session_ = 0;  // 0 = no contact yet
+  std::int64_t next_ = 1;     // sequence to be delivered next
+  std::map<std::int64_t, Waiting> waiting_;
+};
+
+}  // namespace forgescan

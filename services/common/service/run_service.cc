@@ -1,0 +1,66 @@
+#include "services/common/service/run_service.h"
+
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
+#include <sys/signalfd.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <cstdio>
+
+namespace forgescan {
+namespace {
+
+// SIGINT and SIGTERM as a file descriptor of the loop: they end it between two handlers, never inside one.
+int OpenSignals() {
+  sigset_t signals;
+  sigemptyset(&signals);
+  sigaddset(&signals, SIGINT);
+  sigaddset(&signals, SIGTERM);
+  sigprocmask(SIG_BLOCK, &signals, nullptr);
+  return signalfd(-1, &signals, SFD_CLOEXEC | SFD_NONBLOCK);
+}
+
+void WarnOfSmallBuffer(const BusHealth& health) {
+  if (health.receive_buffer_bytes < kWantedReceiveBufferBytes) {
+    spdlog::warn("the bus socket's receive buffer is {} bytes, {} are wanted: frames will often be lost and sent again; "
+                 "sysctl net.core.rmem_max={} allows it",
+                 health.receive_buffer_bytes, kWantedReceiveBufferBytes, kWantedReceiveBufferBytes / 2);
+  }
+}
+
+Status Run(const std::string& name, const std::string& folder, const ServiceFactory& factory) {
+  const int signals = OpenSignals();  // before any library starts a thread
+  ASSIGN_OR_RETURN(const Station station, Station::Load(folder));
+  ASSIGN_OR_RETURN(const auto bus, LcmBus::Open(station.bus_url));
+  WarnOfSmallBuffer(bus->Health());
+  StreamHub hub(*bus, name);
+  ServiceMonitor monitor(hub, name, station.file.hash());
+  bus->Watch(signals, [&bus] { bus->Stop(); });
+  ASSIGN_OR_RETURN(const std::shared_ptr<void> service, factory({station, *bus, hub, monitor}));
+  spdlog::info("running on station {}", station.name);
+  const Status status = bus->Run();
+  monitor.SetState(ServiceState::kStopping, "stopping");
+  close(signals);
+  return status;
+}
+
+}  // namespace
+
+int RunService(const std::string& name, int argc, char** argv, const ServiceFactory& factory) {
+  if (argc != 3 || std::string(argv[1]) != "--station") {
+    std::fprintf(stderr, "usage: forgescan-%s --station FOLDER\n", name.c_str());
+    return 2;
+  }
+  spdlog::set_default_logger(spdlog::stderr_color_mt(name));
+  spdlog::set_pattern("%Y-%m-%d %H:%M:%S.%e %n %l: %v");
+  const Status status = Run(name, argv[2], factory);
+  if (!status.ok()) {
+    spdlog::error("{}", status.error().message);
+    return 1;
+  }
+  spdlog::info("stopped");
+  return 0;
+}
+
+}  // namespace forgescan

@@ -1,0 +1,28 @@
+// What the main.cc of every service shares: arguments, station file, bus, state, signals, exit code.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "services/common/bus/lcm_bus.h"
+#include "services/common/service/service_monitor.h"
+#include "services/common/service/station.h"
+
+namespace forgescan {
+
+struct ServiceContext {
+  const Station& station;
+  LcmBus& bus;
+  StreamHub& hub;
+  ServiceMonitor& monitor;
+};
+
+// Makes the service on its concrete drivers; what it returns lives until the service stops.
+using ServiceFactory = std::function<Result<std::shared_ptr<void>>(const ServiceContext&)>;
+
+// forgescan-NAME --station FOLDER. Runs until SIGINT or SIGTERM. Returns the exit code: 0 stopped on request, 1 otherwise,
+// with one sentence on stderr.
+int RunService(const std::string& name, int argc, char** argv, const ServiceFactory& factory);
+
+}  // namespace forgescan

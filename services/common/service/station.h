@@ -1,0 +1,28 @@
+// A station's folder: station.toml and the files it names. Every service of a station reads the same one.
+#pragma once
+
+#include <string>
+
+#include "services/common/config/config.h"
+
+namespace forgescan {
+
+struct Station {
+  std::string folder;  // where station.toml is; relative paths in it start here
+  std::string name;
+  std::string bus_url;
+  std::string can_url;
+  std::string calibration;  // stereo.yaml
+  std::string pattern;      // pattern.toml: the projected sequence
+  std::string views;        // views.toml: the view matrices
+  std::string model;        // model bundle
+  std::string features;     // features.toml: dimensions and limits
+  std::string results;      // folder for reports and history
+  ConfigFile file;          // the tables of the services
+
+  // Reads [station] of FOLDER/station.toml; file members come out as paths that can be opened.
+  // Errors: as ConfigFile; a table nobody knows is an error too.
+  static Result<Station> Load(const std::string& folder);
+};
+
+}  // namespace forgescan

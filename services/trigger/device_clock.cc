@@ -1,0 +1,38 @@
+#include "services/trigger/device_clock.h"
+
+#include <algorithm>
+
+namespace forgescan {
+namespace {
+
+constexpr std::size_t kWindow = 64;
+
+}  // namespace
+
+void DeviceClock::OnStatus(std::uint32_t device_time_us, std::int64_t arrival_utime) {
+  const std::int64_t unwrapped_us = Unwrap(device_time_us).value_or(device_time_us);
+  started_ = true;
+  last_unwrapped_us_ = std::max(last_unwrapped_us_, unwrapped_us);
+  offsets_us_.push_back(arrival_utime - unwrapped_us);
+  if (offsets_us_.size() > kWindow) {
+    offsets_us_.pop_front();
+  }
+}
+
+std::optional<std::int64_t> DeviceClock::Unwrap(std::uint32_t device_time_us) const {
+  if (!started_) {
+    return std::nullopt;
+  }
+  const auto difference =
+      static_cast<std::int32_t>(device_time_us - static_cast<std::uint32_t>(last_unwrapped_us_));
+  return last_unwrapped_us_ + difference;
+}
+
+std::optional<std::int64_t> DeviceClock::ToStation(std::int64_t unwrapped_us) const {
+  if (offsets_us_.empty()) {
+    return std::nullopt;
+  }
+  return unwrapped_us + *std::min_element(offsets_us_.begin(), offsets_us_.end());
+}
+
+}  // namespace forgescan
