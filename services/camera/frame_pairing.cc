@@ -64,11 +64,17 @@ std::vector<PairingAction> FramePairing::AdvanceTo(std::int64_t now_us) {
   return actions;
 }
 
-void FramePairing::OnCameraStarted() {
+std::vector<PairingAction> FramePairing::OnCameraStarted() {
+  std::vector<PairingAction> actions;
+  for (const FrameRecord& frame : waiting_) {
+    actions.push_back({PairingVerdict::kStray, 0, frame.handle});
+  }
+  waiting_.clear();
   anchor_.reset();
   view_key_.reset();  // what follows counts as a new view
   last_id_ = 0;
   view_has_gaps_ = false;
+  return actions;
 }
 
 void FramePairing::BeginView(const PulseRecord& first) {

@@ -78,8 +78,9 @@ class FramePairing {
   std::vector<PairingAction> OnPulse(const PulseRecord& record);
   std::vector<PairingAction> OnFrame(const FrameRecord& frame);
   std::vector<PairingAction> AdvanceTo(std::int64_t now_us);
-  // The camera was started again: its ids begin at 1 and its clock may have jumped.
-  void OnCameraStarted();
+  // The camera was started again: its ids begin at 1 and its clock may have jumped. Frames that waited are
+  // stray.
+  std::vector<PairingAction> OnCameraStarted();
 
   bool anchored() const { return anchor_.has_value(); }
 

@@ -1,5 +1,5 @@
-// For ThreadSanitizer builds of any program that uses Aravis. Its libraries and GLib are not instrumented: their locks are
-// invisible, so every buffer they hand over looks like a race. Our own code stays under watch.
+// For ThreadSanitizer builds of any program that uses Aravis. Its libraries and GLib are not instrumented: their
+// locks are invisible, so every buffer they hand over looks like a race. Our own code stays under watch.
 #if defined(__SANITIZE_THREAD__)
 extern "C" const char* __tsan_default_suppressions();
 extern "C" const char* __tsan_default_suppressions() {

@@ -108,13 +108,14 @@ TEST_F(FramePairingTest, DuplicateIsNotPublishedTwice) {
 TEST_F(FramePairingTest, CameraStartedAgainCountsFrom1) {
   Pulse(1);
   Frame(1, 1);
-  pairing_.OnCameraStarted();
+  Frame(7, 2);  // of the old count and clock
+  Note(pairing_.OnCameraStarted());
   EXPECT_FALSE(pairing_.anchored());
   jitter_us_ = -5'000'000;  // another clock
   view_ = 2;
   Pulse(2);
   Frame(2, 1);
-  EXPECT_EQ(Log(), "P1=1 P2=2");
+  EXPECT_EQ(Log(), "P1=1 S0=7 P2=2");
 }
 
 TEST_F(FramePairingTest, IdAfter65535Is1) {
