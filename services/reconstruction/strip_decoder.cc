@@ -104,10 +104,11 @@ void StripDecoder::SolvePhases(std::size_t j) {
   std::fill_n(a, length, 0.0f);
   for (const Weighted& weight : weights_[j]) {
     const float* const grey = frames_[weight.frame].data();
+    const float wc = weight.cosine, ws = weight.sine, wa = weight.background;  // local: see length
     for (int x = 0; x < length; ++x) {
-      c[x] += weight.cosine * grey[x];
-      s[x] += weight.sine * grey[x];
-      a[x] += weight.background * grey[x];
+      c[x] += wc * grey[x];
+      s[x] += ws * grey[x];
+      a[x] += wa * grey[x];
     }
   }
   for (int x = 0; x < length; ++x) {
