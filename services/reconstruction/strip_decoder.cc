@@ -21,6 +21,11 @@ void LoadLane(const cv::Mat& frame, int row, int column, std::span<float> lane, 
   }
 }
 
+// Without a branch, so that loops over it vectorise.
+inline void Mark(std::int32_t& slot, bool applies, MaskCause cause) {
+  slot = applies ? static_cast<std::int32_t>(cause) : slot;
+}
+
 // The nearest whole number, for |value| < 4000; truncation of a positive number vectorises everywhere.
 inline float Nearest(float value) {
   return static_cast<float>(static_cast<std::int32_t>(value + 4096.5f) - 4096);
@@ -88,23 +93,25 @@ void StripDecoder::Decode() {
 }
 
 void StripDecoder::SolvePhases(std::size_t j) {
+  const int length = length_;  // a local bound, which no store through a member can change
   float* const c = cosine_[j].data();
   float* const s = sine_[j].data();
   float* const a = background_[j].data();
   float* const b = modulation_[j].data();
   float* const turns = turns_[j].data();
-  std::fill_n(c, length_, 0.0f);
-  std::fill_n(s, length_, 0.0f);
-  std::fill_n(a, length_, 0.0f);
+  std::fill_n(c, length, 0.0f);
+  std::fill_n(s, length, 0.0f);
+  std::fill_n(a, length, 0.0f);
   for (const Weighted& weight : weights_[j]) {
     const float* const grey = frames_[weight.frame].data();
-    for (int x = 0; x < length_; ++x) {
-      c[x] += weight.cosine * grey[x];
-      s[x] += weight.sine * grey[x];
-      a[x] += weight.background * grey[x];
+    const float wc = weight.cosine, ws = weight.sine, wa = weight.background;  // local: see length
+    for (int x = 0; x < length; ++x) {
+      c[x] += wc * grey[x];
+      s[x] += ws * grey[x];
+      a[x] += wa * grey[x];
     }
   }
-  for (int x = 0; x < length_; ++x) {
+  for (int x = 0; x < length; ++x) {
     turns[x] = TurnsFromPhasor(c[x], s[x]);
     b[x] = std::sqrt(c[x] * c[x] + s[x] * s[x]) + kTinyDn;
     c[x] /= b[x];
@@ -113,11 +120,12 @@ void StripDecoder::SolvePhases(std::size_t j) {
 }
 
 void StripDecoder::Unwrap() {
+  const int length = length_;  // a local bound, which no store through a member can change
   const float* const base = turns_[static_cast<std::size_t>(table_.base)].data();
   const float* const other1 = turns_[static_cast<std::size_t>(table_.others[0])].data();
   const float* const other2 = turns_[static_cast<std::size_t>(table_.others[1])].data();
   const bool has_second = table_.other_count == 2;
-  for (int x = 0; x < length_; ++x) {
+  for (int x = 0; x < length; ++x) {
     const float r1 = other1[x] - table_.ratios[0] * base[x];
     const float r2 = has_second ? other2[x] - table_.ratios[1] * base[x] : 0.0f;
     const FringeOrderTable::Entry entry = table_.Look(r1, r2);
@@ -127,10 +135,11 @@ void StripDecoder::Unwrap() {
 }
 
 void StripDecoder::Fuse() {
+  const int length = length_;  // a local bound, which no store through a member can change
   const auto base = static_cast<std::size_t>(table_.base);
   const auto origin = static_cast<float>(pattern_.phase_origin_px);
   const float* const base_turns = turns_[base].data();
-  for (int x = 0; x < length_; ++x) {
+  for (int x = 0; x < length; ++x) {
     const auto at = static_cast<std::size_t>(x);
     coordinate_px[at] = origin + period_px_[base] * (order_[at] + base_turns[at]);
     disagreement_rad[at] = 0;
@@ -140,7 +149,7 @@ void StripDecoder::Fuse() {
     const float ratio = table_.ratios[static_cast<std::size_t>(o)];
     const float gain_px = fusion_[j] * period_px_[j];
     const float* const turns = turns_[j].data();
-    for (int x = 0; x < length_; ++x) {
+    for (int x = 0; x < length; ++x) {
       const auto at = static_cast<std::size_t>(x);
       const float predicted =
           (order_[at] + base_turns[at]) * ratio - turns[at];  // fringe order of j, not yet whole
@@ -150,7 +159,7 @@ void StripDecoder::Fuse() {
     }
   }
   const float scale = 1.0f / static_cast<float>(table_.other_count);
-  for (int x = 0; x < length_; ++x) {
+  for (int x = 0; x < length; ++x) {
     const auto at = static_cast<std::size_t>(x);
     disagreement_rad[at] = kTwoPi * std::sqrt(scale * disagreement_rad[at]);
   }
@@ -160,37 +169,39 @@ void StripDecoder::Fuse() {
 // B_j) (cos phi_j sine(j,i) - sin phi_j cosine(j,i)); the variances of the frames add with the squares of
 // these factors.
 void StripDecoder::PredictSigma() {
+  const int length = length_;  // a local bound, which no store through a member can change
   const auto read_variance = static_cast<float>(config_.noise.read_noise_dn * config_.noise.read_noise_dn);
   const auto gain = static_cast<float>(config_.noise.gain_dn);
   std::array<Lane, kMaxFrequencies> c;
   std::array<Lane, kMaxFrequencies> s;
   for (std::size_t j = 0; j < weights_.size(); ++j) {
-    for (std::size_t x = 0; x < static_cast<std::size_t>(length_); ++x) {
+    for (std::size_t x = 0; x < static_cast<std::size_t>(length); ++x) {
       c[j][x] = cosine_[j][x] / modulation_[j][x];
       s[j][x] = sine_[j][x] / modulation_[j][x];
     }
   }
-  std::fill_n(sigma_px.begin(), length_, 0.0f);
+  std::fill_n(sigma_px.begin(), length, 0.0f);
   Lane factor;
   for (std::size_t i = 0; i < terms_.size(); ++i) {
-    std::fill_n(factor.begin(), length_, 0.0f);
+    std::fill_n(factor.begin(), length, 0.0f);
     for (const FrameTerm& term : terms_[i]) {
       const float* const cj = c[term.frequency].data();
       const float* const sj = s[term.frequency].data();
-      for (int x = 0; x < length_; ++x) {
+      for (int x = 0; x < length; ++x) {
         factor[static_cast<std::size_t>(x)] += cj[x] * term.sine - sj[x] * term.cosine;
       }
     }
-    for (std::size_t x = 0; x < static_cast<std::size_t>(length_); ++x) {
+    for (std::size_t x = 0; x < static_cast<std::size_t>(length); ++x) {
       sigma_px[x] += (read_variance + gain * frames_[i][x]) * factor[x] * factor[x];
     }
   }
-  for (std::size_t x = 0; x < static_cast<std::size_t>(length_); ++x) {
+  for (std::size_t x = 0; x < static_cast<std::size_t>(length); ++x) {
     sigma_px[x] = std::sqrt(sigma_px[x]);
   }
 }
 
 void StripDecoder::Classify() {
+  const int length = length_;  // a local bound, which no store through a member can change
   constexpr double kFullScaleDn = 255;
   const auto saturation_dn = static_cast<float>(config_.saturation_fraction * kFullScaleDn);
   const auto min_dn = static_cast<float>(config_.min_modulation_dn);
@@ -198,7 +209,7 @@ void StripDecoder::Classify() {
   const auto min_sigmas = static_cast<float>(config_.min_modulation_sigma);
   const auto read_variance = static_cast<float>(config_.noise.read_noise_dn * config_.noise.read_noise_dn);
   const auto gain = static_cast<float>(config_.noise.gain_dn);
-  for (std::size_t x = 0; x < static_cast<std::size_t>(length_); ++x) {
+  for (std::size_t x = 0; x < static_cast<std::size_t>(length); ++x) {
     float least = modulation_[0][x];
     float level = background_[0][x];
     float worst = phase_noise_[0] / modulation_[0][x];
@@ -213,47 +224,43 @@ void StripDecoder::Classify() {
     cause[x] = static_cast<std::int32_t>(MaskCause::kValid);
   }
   const auto max_disagreement = static_cast<float>(config_.max_pixel_disagreement_rad);
-  for (int x = 0; x < length_;
+  for (int x = 0; x < length;
        ++x) {  // the last cause to be written wins: the order is that of MaskCause, backwards
     const auto at = static_cast<std::size_t>(x);
-    Mark(x, disagreement_rad[at] > max_disagreement, static_cast<int>(MaskCause::kDisagreement));
-    Mark(x, doubtful_[at] != 0, static_cast<int>(MaskCause::kUnwrapMargin));
-    Mark(x, !(coordinate_px[at] >= table_.first_px && coordinate_px[at] <= table_.last_px),
-         static_cast<int>(MaskCause::kOutOfRange));
+    Mark(cause[at], disagreement_rad[at] > max_disagreement, MaskCause::kDisagreement);
+    Mark(cause[at], doubtful_[at] != 0, MaskCause::kUnwrapMargin);
+    Mark(cause[at], !(coordinate_px[at] >= table_.first_px && coordinate_px[at] <= table_.last_px),
+         MaskCause::kOutOfRange);
   }
   ClassifyReference();
   ClassifyRatios();
-  for (int x = 0; x < length_; ++x) {
+  for (int x = 0; x < length; ++x) {
     const auto at = static_cast<std::size_t>(x);
-    Mark(x, phase_sigma_rad[at] > max_phase_sigma, static_cast<int>(MaskCause::kNoisy));
-    Mark(x, modulation_dn[at] < min_dn || modulation_dn[at] < min_sigmas * grey_sigma_[at],
-         static_cast<int>(MaskCause::kLowModulation));
-    Mark(x, peak_[at] >= saturation_dn, static_cast<int>(MaskCause::kSaturated));
+    Mark(cause[at], phase_sigma_rad[at] > max_phase_sigma, MaskCause::kNoisy);
+    Mark(cause[at], modulation_dn[at] < min_dn || modulation_dn[at] < min_sigmas * grey_sigma_[at],
+         MaskCause::kLowModulation);
+    Mark(cause[at], peak_[at] >= saturation_dn, MaskCause::kSaturated);
   }
 }
 
-inline void StripDecoder::Mark(int index, bool applies, int mask_cause) {
-  auto& slot = cause[static_cast<std::size_t>(index)];
-  slot = applies ? mask_cause : slot;
-}
-
 void StripDecoder::ClassifyRatios() {
+  const int length = length_;   // a local bound, which no store through a member can change
   constexpr float kSigmas = 5;  // a ratio of two noisy modulations may be off by its own noise as well
   for (std::size_t j = 1; j < weights_.size(); ++j) {
     const auto expected = static_cast<float>(pattern_.frequencies[j].modulation_ratio /
                                              pattern_.frequencies[0].modulation_ratio);
     const auto relative = static_cast<float>(config_.modulation_ratio_tolerance);
-    for (int x = 0; x < length_; ++x) {
+    for (int x = 0; x < length; ++x) {
       const auto at = static_cast<std::size_t>(x);
       const float wanted = expected * modulation_[0][at];
       const float off = std::abs(modulation_[j][at] - wanted);
-      Mark(x, off > relative * wanted + kSigmas * grey_sigma_[at],
-           static_cast<int>(MaskCause::kModulationRatio));
+      Mark(cause[at], off > relative * wanted + kSigmas * grey_sigma_[at], MaskCause::kModulationRatio);
     }
   }
 }
 
 void StripDecoder::ClassifyReference() {
+  const int length = length_;  // a local bound, which no store through a member can change
   if (!pattern_.reference_frame_index) {
     return;
   }
@@ -261,11 +268,11 @@ void StripDecoder::ClassifyReference() {
   const auto per_modulation = static_cast<float>(1 / pattern_.reference_contrast);
   const auto sigmas = static_cast<float>(config_.reference_tolerance_sigma);
   const auto part = static_cast<float>(config_.reference_tolerance_modulation);
-  for (int x = 0; x < length_; ++x) {
+  for (int x = 0; x < length; ++x) {
     const auto at = static_cast<std::size_t>(x);
     const float wanted = std::min(background_[0][at] + per_modulation * modulation_[0][at], 255.0f);
     const float limit = std::max(sigmas * grey_sigma_[at], part * modulation_[0][at]);
-    Mark(x, std::abs(white[at] - wanted) > limit, static_cast<int>(MaskCause::kReference));
+    Mark(cause[at], std::abs(white[at] - wanted) > limit, MaskCause::kReference);
   }
 }
 

@@ -56,7 +56,6 @@ class StripDecoder {
   void Classify();
   void ClassifyRatios();
   void ClassifyReference();
-  void Mark(int index, bool applies, int mask_cause);
 
   const PatternSet& pattern_;
   const FringeOrderTable& table_;
