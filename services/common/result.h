@@ -1,7 +1,8 @@
 // Result<T>: a value, or an Error that says in one sentence what went wrong, where and with which numbers.
 //
-// House rule: a function that can fail returns Result (or Status = Result<void>); a failure is never an identity matrix, a
-// zero, an empty container or the last value. Exceptions stay inside main() and at the edges of third-party libraries.
+// House rule: a function that can fail returns Result (or Status = Result<void>); a failure is never an
+// identity matrix, a zero, an empty container or the last value. Exceptions stay inside main() and at the
+// edges of third-party libraries.
 #pragma once
 
 #include <fmt/core.h>
@@ -60,10 +61,12 @@ class [[nodiscard]] Result {
   // Only if ok(): asking a failed result for its value is a bug of ours, not of the data.
   T& value() & { return assert(ok()), std::get<0>(state_); }
   const T& value() const& { return assert(ok()), std::get<0>(state_); }
-  T&& value() && { return assert(ok()), std::get<0>(std::move(state_)); }
+  // By value: `for (auto& x : *Slices())` then keeps what it runs over.
+  T value() && { return assert(ok()), std::get<0>(std::move(state_)); }
   const Error& error() const { return assert(!ok()), std::get<1>(state_); }
   T& operator*() & { return value(); }
   const T& operator*() const& { return value(); }
+  T operator*() && { return std::move(*this).value(); }
   T* operator->() { return &value(); }
   const T* operator->() const { return &value(); }
 
@@ -92,14 +95,15 @@ using Status = Result<void>;
 #define FORGESCAN_CONCAT(a, b) FORGESCAN_CONCAT_(a, b)
 
 // Leaves the enclosing function with the error, if there is one.
-#define RETURN_IF_ERROR(expression)                                                     \
-  do {                                                                                  \
-    if (auto forgescan_status = (expression); !forgescan_status.ok()) {                 \
-      return forgescan_status.error();                                                  \
-    }                                                                                   \
+#define RETURN_IF_ERROR(expression)                                     \
+  do {                                                                  \
+    if (auto forgescan_status = (expression); !forgescan_status.ok()) { \
+      return forgescan_status.error();                                  \
+    }                                                                   \
   } while (false)
 
-// ASSIGN_OR_RETURN(auto cloud, ReadPly(path)); declares or assigns on success, leaves with the error otherwise.
+// ASSIGN_OR_RETURN(auto cloud, ReadPly(path)); declares or assigns on success, leaves with the error
+// otherwise.
 #define ASSIGN_OR_RETURN(target, expression) \
   ASSIGN_OR_RETURN_IMPL_(FORGESCAN_CONCAT(forgescan_result_, __LINE__), target, expression)
 #define ASSIGN_OR_RETURN_IMPL_(result, target, expression) \

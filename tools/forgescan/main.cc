@@ -9,6 +9,11 @@ int main(int argc, char** argv) {
   forgescan::Status outcome;
   try {
     forgescan::AddReconstructCommand(app, outcome);
+    forgescan::AddRegisterCommand(app, outcome);
+    forgescan::AddFitCommand(app, outcome);
+    forgescan::AddModelCommand(app, outcome);
+    forgescan::AddStationCommand(app, outcome);
+    forgescan::AddInspectCommand(app, outcome);
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error);

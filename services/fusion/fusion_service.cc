@@ -1,0 +1,156 @@
+#include "services/fusion/fusion_service.h"
+
+#include <fmt/format.h>
+
+#include "services/common/bus/channels.h"
+#include "services/common/service/step_timer.h"
+
+namespace forgescan {
+namespace {
+
+constexpr std::size_t kMaxPartsInWork = 8;
+
+}  // namespace
+
+FusionService::FusionService(StreamHub& hub, ServiceMonitor& monitor, FusionConfig config,
+                             ViewMatrices matrices, ExpansionCurve curve)
+    : hub_(hub),
+      monitor_(monitor),
+      config_(std::move(config)),
+      matrices_(std::move(matrices)),
+      curve_(std::move(curve)) {
+  hub_.Advertise(kFusedCloud);
+  hub_.Advertise(kFusionResult);
+  hub_.Advertise(kFusionTime);
+  hub_.Subscribe<fsmsg::part_arrived_t>(kPartArrived, [this](const auto& arrived) {
+    Part(arrived.part).OnArrived(arrived);
+    FinishIfSettled(arrived.part);
+  });
+  hub_.Subscribe<fsmsg::view_result_t>(kViewResult, [this](const auto& result) {
+    Part(result.part).OnViewResult(result);
+    FinishIfSettled(result.part);
+  });
+  hub_.Subscribe<fsmsg::part_temperature_t>(kPartTemperature, [this](const auto& temperature) {
+    Part(temperature.part).OnTemperature(temperature);
+    FinishIfSettled(temperature.part);
+  });
+  hub_.Subscribe<fsmsg::cloud_slice_t>(kViewCloud, [this](const auto& slice) { OnCloudSlice(slice); });
+  hub_.Subscribe<fsmsg::scan_complete_t>(kScanComplete, [this](const auto& scan) { OnScanComplete(scan); });
+  monitor_.SetState(ServiceState::kReady, "waiting for a part");
+}
+
+PartCollector& FusionService::Part(int part) {
+  if (parts_.size() >= kMaxPartsInWork && !parts_.contains(part)) {
+    monitor_.ReportError(
+        Fail(ErrorCode::kUntrusted, "part {} never finished and is dropped", parts_.begin()->first));
+    assembler_.Forget(parts_.begin()->first);
+    parts_.erase(parts_.begin());
+  }
+  return parts_[part];
+}
+
+void FusionService::OnCloudSlice(const fsmsg::cloud_slice_t& slice) {
+  Result<std::optional<PointCloud>> cloud = assembler_.Add(slice);
+  if (!cloud.ok()) {
+    monitor_.ReportError(cloud.error());
+  } else if (cloud->has_value()) {
+    Part(slice.part).OnCloud(slice.view, std::move(**cloud));
+    FinishIfSettled(slice.part);
+  }
+}
+
+void FusionService::OnScanComplete(const fsmsg::scan_complete_t& scan) {
+  Part(scan.part).OnScanComplete(scan);
+  const auto timeout_us = static_cast<std::int64_t>(config_.view_timeout_s * 1e6);
+  hub_.bus().At(hub_.bus().NowUs() + timeout_us, [this, part = scan.part] {
+    if (const auto found = parts_.find(part); found != parts_.end()) {
+      found->second.Expire(fmt::format("no result within {} s of the scan", config_.view_timeout_s));
+      FinishIfSettled(part);
+    }
+  });
+  FinishIfSettled(scan.part);
+}
+
+void FusionService::FinishIfSettled(int part) {
+  const auto found = parts_.find(part);
+  if (found != parts_.end() && found->second.Settled()) {
+    Finish(part, found->second);
+    parts_.erase(found);
+    assembler_.Forget(part);
+  }
+}
+
+std::string FusionService::VoidReason(const PartCollector& collector,
+                                      const PartCollector::Views& views) const {
+  if (!collector.arrived().has_value()) {
+    return "the part's arrival was not seen";
+  }
+  const auto crc = static_cast<std::uint32_t>(collector.arrived()->path_crc32);
+  if (crc != matrices_.path_crc32) {
+    return fmt::format("the robot's path {:08x} is not the one the view matrices were taught on, {:08x}", crc,
+                       matrices_.path_crc32);
+  }
+  std::string voids;
+  for (const auto& view : views.summary) {
+    if (view.status != fsmsg::view_result_t::STATUS_OK) {
+      voids += fmt::format("{}view {} ({})", voids.empty() ? "" : ", ", view.view, view.reason);
+    }
+  }
+  const auto missing = static_cast<int>(views.summary.size() - views.clouds.size());
+  return missing > config_.missing_views_allowed ? "void views: " + voids : std::string();
+}
+
+void FusionService::Finish(int part, PartCollector& collector) {
+  const StepTimer timer(hub_, "fusion", part, kAllViews);
+  PartCollector::Views views = collector.TakeViews();
+  fsmsg::fusion_result_t result{};
+  result.utime = views.last_utime;
+  result.part = part;
+  result.reason = VoidReason(collector, views);
+  result.reference_degc = config_.reference_temperature_degc;
+  result.scan_start_utime = collector.scan()->scan_start_utime;
+  result.frames_expected = views.frames_expected;
+  result.frames_used = views.frames_used;
+  PointCloud cloud;
+  if (result.reason.empty()) {
+    const auto& fixed = config_.fixed_point_mm;
+    Result<FusedCloud> fused =
+        FuseViews(views.clouds, matrices_, curve_,
+                  {config_.reference_temperature_degc, {fixed[0], fixed[1], fixed[2]}});
+    result.reason = fused.ok() ? std::string() : fused.error().message;
+    if (fused.ok()) {
+      cloud = std::move(fused->cloud_in_array);
+      for (std::size_t i = 0; i < views.clouds.size(); ++i) {
+        views.summary[static_cast<std::size_t>(views.clouds[i].view)].scale = fused->scales[i];
+      }
+    }
+  }
+  result.status = result.reason.empty() ? fsmsg::view_result_t::STATUS_OK : fsmsg::view_result_t::STATUS_VOID;
+  result.views = std::move(views.summary);
+  result.view_count = static_cast<std::int32_t>(result.views.size());
+  Publish(std::move(result), cloud);
+  timer.Finish(kFusionTime, monitor_);
+}
+
+void FusionService::Publish(fsmsg::fusion_result_t result, const PointCloud& cloud) {
+  result.points = static_cast<std::int32_t>(cloud.size());
+  const auto publish = [&]() -> Status {
+    if (result.status == fsmsg::view_result_t::STATUS_OK) {
+      ASSIGN_OR_RETURN(const auto slices, SliceCloud(cloud, result.utime, result.part, kAllViews));
+      for (const auto& slice : slices) {
+        RETURN_IF_ERROR(hub_.Publish(kFusedCloud, slice));
+      }
+    }
+    return hub_.Publish(kFusionResult, result);
+  };
+  if (const Status sent = publish(); !sent.ok()) {
+    monitor_.ReportError(sent.error());
+  }
+  if (!result.reason.empty()) {
+    monitor_.ReportError(Fail(ErrorCode::kUntrusted, "part {}: {}", result.part, result.reason));
+  }
+  monitor_.Count(result.reason.empty() ? "parts_fused" : "parts_void");
+  monitor_.SetState(ServiceState::kReady, fmt::format("part {}: {} points", result.part, result.points));
+}
+
+}  // namespace forgescan

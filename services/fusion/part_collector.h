@@ -1,0 +1,66 @@
+// Collects what arrives about one part until every view is there or known to be void. Pure: no bus, no clock.
+//
+//            first news of the part                     scan complete, all views settled
+//   (none) -------------------------> collecting ---------------------------------------> settled
+//                                          | deadline after scan complete: open views become void
+//                                          +-----------------------------------------------^
+// Events may come in any order and more than once; a newer attempt at a view replaces an older one.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+
+#include "fsmsg/fusion_result_t.hpp"
+#include "fsmsg/part_arrived_t.hpp"
+#include "fsmsg/part_temperature_t.hpp"
+#include "fsmsg/scan_complete_t.hpp"
+#include "fsmsg/view_result_t.hpp"
+#include "services/common/geometry/point_cloud.h"
+#include "services/fusion/fuse.h"
+
+namespace forgescan {
+
+class PartCollector {
+ public:
+  void OnArrived(const fsmsg::part_arrived_t& arrived) { arrived_ = arrived; }
+  void OnViewResult(const fsmsg::view_result_t& result);
+  void OnCloud(int view, PointCloud cloud) { views_[view].cloud = std::move(cloud); }
+  void OnTemperature(const fsmsg::part_temperature_t& temperature) {
+    views_[temperature.view].temperature = temperature;
+  }
+  void OnScanComplete(const fsmsg::scan_complete_t& scan) { scan_ = scan; }
+  // Views still open become void for this reason.
+  void Expire(const std::string& reason) { expired_ = reason; }
+
+  const std::optional<fsmsg::part_arrived_t>& arrived() const { return arrived_; }
+  const std::optional<fsmsg::scan_complete_t>& scan() const { return scan_; }
+  // All views are settled: TakeViews() may be called.
+  bool Settled() const;
+  // The usable clouds move to `clouds`; the summary has one entry a view, void ones with their reason.
+  struct Views {
+    std::vector<ViewCloud> clouds;
+    std::vector<fsmsg::fused_view_t> summary;
+    std::int64_t last_utime = 0;  // of the last view
+    int frames_expected = 0;
+    int frames_used = 0;
+  };
+  Views TakeViews();
+
+ private:
+  struct View {
+    std::optional<fsmsg::view_result_t> result;
+    std::optional<PointCloud> cloud;
+    std::optional<fsmsg::part_temperature_t> temperature;
+  };
+  // Why the view is void; empty = it is usable; nothing = still open.
+  std::optional<std::string> VoidReason(const View& view) const;
+  bool AllCapturedHaveResults() const;
+
+  std::optional<fsmsg::part_arrived_t> arrived_;
+  std::optional<fsmsg::scan_complete_t> scan_;
+  std::optional<std::string> expired_;
+  std::map<int, View> views_;
+};
+
+}  // namespace forgescan

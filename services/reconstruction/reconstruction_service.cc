@@ -1,0 +1,172 @@
+#include "services/reconstruction/reconstruction_service.h"
+
+#include <fmt/format.h>
+
+#include "services/common/bus/channels.h"
+#include "services/common/bus/cloud_stream.h"
+#include "services/common/service/step_timer.h"
+#include "services/reconstruction/thin_cloud.h"
+
+namespace forgescan {
+namespace {
+
+constexpr std::size_t kMaxViewsInWork = 8;
+
+std::vector<cv::Mat> Images(const std::vector<const fsmsg::frame_t*>& frames) {
+  std::vector<cv::Mat> images;
+  for (const fsmsg::frame_t* frame : frames) {  // a view of the message's bytes, only read
+    images.emplace_back(frame->height_px, frame->width_px, CV_8UC1,
+                        const_cast<std::uint8_t*>(frame->data.data()));
+  }
+  return images;
+}
+
+std::int32_t Count(const std::array<long, kMaskCauses>& pixels, MaskCause cause) {
+  return static_cast<std::int32_t>(pixels[static_cast<std::size_t>(cause)]);
+}
+
+void Describe(const CameraQuality& left, fsmsg::view_result_t& result) {
+  result.pixels_valid = Count(left.pixels, MaskCause::kValid);
+  result.mask_saturated = Count(left.pixels, MaskCause::kSaturated);
+  result.mask_modulation = Count(left.pixels, MaskCause::kLowModulation);
+  result.mask_noise = Count(left.pixels, MaskCause::kNoisy);
+  result.mask_inconsistent =
+      Count(left.pixels, MaskCause::kModulationRatio) + Count(left.pixels, MaskCause::kReference) +
+      Count(left.pixels, MaskCause::kUnwrapMargin) + Count(left.pixels, MaskCause::kDisagreement);
+  result.modulation_median_dn = left.median_modulation_dn;
+  result.consistency_rms_rad = left.trust.disagreement_rad;
+}
+
+}  // namespace
+
+ReconstructionService::ReconstructionService(StreamHub& hub, ServiceMonitor& monitor,
+                                             const ReconstructionServiceConfig& config, PatternSet pattern,
+                                             StereoCalibration calibration)
+    : hub_(hub),
+      monitor_(monitor),
+      config_(config),
+      pattern_(std::move(pattern)),
+      calibration_(std::move(calibration)) {
+  hub_.Advertise(kViewCloud);
+  hub_.Advertise(kViewResult);
+  hub_.Advertise(kReconstructionTime);
+  hub_.Subscribe<fsmsg::view_captured_t>(kViewCaptured,
+                                         [this](const auto& captured) { OnCaptured(captured); });
+  const auto on_frame = [this](const fsmsg::frame_t& frame) {
+    if (ViewCollector* view = View(frame.part, frame.view)) {
+      view->OnFrame(frame);
+      FinishIfSettled({frame.part, frame.view});
+    }
+  };
+  hub_.Subscribe<fsmsg::frame_t>(kFrameLeft, on_frame);
+  hub_.Subscribe<fsmsg::frame_t>(kFrameRight, on_frame);
+  const auto on_manifest = [this](const fsmsg::view_frames_t& manifest) {
+    if (ViewCollector* view = View(manifest.part, manifest.view)) {
+      view->OnManifest(manifest);
+      FinishIfSettled({manifest.part, manifest.view});
+    }
+  };
+  hub_.Subscribe<fsmsg::view_frames_t>(kViewFramesLeft, on_manifest);
+  hub_.Subscribe<fsmsg::view_frames_t>(kViewFramesRight, on_manifest);
+  monitor_.SetState(ServiceState::kReady, "waiting for frames");
+}
+
+ViewCollector* ReconstructionService::View(int part, int view) {
+  const Key key{part, view};
+  const auto found = views_.find(key);
+  if (found != views_.end()) {
+    return &found->second;
+  }
+  if (views_.size() >= kMaxViewsInWork) {
+    const Key oldest = views_.begin()->first;
+    monitor_.ReportError(Fail(ErrorCode::kUntrusted, "part {} view {} never finished and is dropped",
+                              oldest.first, oldest.second));
+    views_.erase(views_.begin());
+  }
+  return &views_.emplace(key, ViewCollector(pattern_.frame_count())).first->second;
+}
+
+void ReconstructionService::OnCaptured(const fsmsg::view_captured_t& captured) {
+  const Key key{captured.part, captured.view};
+  View(captured.part, captured.view)->OnCaptured(captured);
+  const auto timeout_us = static_cast<std::int64_t>(config_.frame_timeout_s * 1e6);
+  hub_.bus().At(hub_.bus().NowUs() + timeout_us, [this, key, attempt = captured.attempt] {
+    const auto found = views_.find(key);
+    if (found != views_.end() && found->second.attempt() == attempt) {
+      found->second.Expire(fmt::format("{} of {} frames came within {} s", found->second.frames_received(),
+                                       2 * pattern_.frame_count(), config_.frame_timeout_s));
+      FinishIfSettled(key);
+    }
+  });
+  FinishIfSettled(key);
+}
+
+void ReconstructionService::FinishIfSettled(Key key) {
+  const auto found = views_.find(key);
+  if (found != views_.end() && found->second.state() != ViewCollector::State::kCollecting) {
+    const auto node = views_.extract(found);
+    Finish(key, node.mapped());
+  }
+}
+
+Result<Reconstruction> ReconstructionService::Run(const ViewCollector& view) {
+  const auto left = Images(view.Frames(fsmsg::exposure_t::CAMERA_LEFT));
+  const auto right = Images(view.Frames(fsmsg::exposure_t::CAMERA_RIGHT));
+  const ImageSize size{left.front().cols, left.front().rows};
+  if (reconstructor_ == nullptr || size.width_px != image_size_.width_px ||
+      size.height_px != image_size_.height_px) {
+    ASSIGN_OR_RETURN(Reconstructor made,
+                     Reconstructor::Create(pattern_, calibration_, size, config_.reconstruction));
+    reconstructor_ = std::make_unique<Reconstructor>(std::move(made));
+    image_size_ = size;
+  }
+  return reconstructor_->Run(left, right);
+}
+
+void ReconstructionService::Finish(Key key, const ViewCollector& view) {
+  const StepTimer timer(hub_, "reconstruction", key.first, key.second);
+  fsmsg::view_result_t result{};
+  result.utime = view.middle_utime();
+  result.part = key.first;
+  result.view = key.second;
+  result.attempt = view.attempt();
+  result.frames_expected = 2 * pattern_.frame_count();
+  result.frames_used = view.frames_received();
+  result.reason = view.void_reason();
+  PointCloud cloud;
+  if (view.state() == ViewCollector::State::kComplete) {
+    monitor_.SetState(ServiceState::kWorking, fmt::format("part {} view {}", key.first, key.second));
+    Result<Reconstruction> reconstruction = Run(view);
+    result.reason = reconstruction.ok() ? std::string() : reconstruction.error().message;
+    if (reconstruction.ok()) {
+      Describe(reconstruction->quality.left, result);
+      result.sigma_median_mm = reconstruction->quality.median_sigma_mm;
+      cloud = EveryNthPoint(reconstruction->cloud_in_camera, config_.publish_every_nth_point, key.second);
+    }
+  }
+  result.status = result.reason.empty() ? fsmsg::view_result_t::STATUS_OK : fsmsg::view_result_t::STATUS_VOID;
+  result.points = static_cast<std::int32_t>(cloud.size());
+  if (const Status sent = Publish(result, cloud); !sent.ok()) {
+    monitor_.ReportError(sent.error());
+  }
+  timer.Finish(kReconstructionTime, monitor_);
+}
+
+Status ReconstructionService::Publish(const fsmsg::view_result_t& result, const PointCloud& cloud) {
+  if (result.reason.empty()) {
+    ASSIGN_OR_RETURN(const auto slices, SliceCloud(cloud, result.utime, result.part, result.view));
+    for (const auto& slice : slices) {
+      RETURN_IF_ERROR(hub_.Publish(kViewCloud, slice));
+    }
+    monitor_.Count("views_reconstructed");
+  } else {
+    monitor_.Count("views_void");
+    monitor_.ReportError(
+        Fail(ErrorCode::kUntrusted, "part {} view {}: {}", result.part, result.view, result.reason));
+  }
+  monitor_.SetState(ServiceState::kReady,
+                    fmt::format("part {} view {}: {} points", result.part, result.view, result.points));
+  return hub_.Publish(kViewResult, result);
+}
+
+}  // namespace forgescan

@@ -1,0 +1,51 @@
+// The reconstruction service: frames of a view in, its points or the reason why there are none out.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <utility>
+
+#include "fsmsg/view_result_t.hpp"
+#include "services/common/config/config.h"
+#include "services/common/service/service_monitor.h"
+#include "services/reconstruction/reconstruct.h"
+#include "services/reconstruction/view_collector.h"
+
+namespace forgescan {
+
+// What the service adds to the thresholds of the reconstruction itself: table [reconstruction] of
+// station.toml.
+struct ReconstructionServiceConfig {
+  ReconstructionConfig reconstruction;
+  int publish_every_nth_point = 8;  // in scanner order; the fits need far fewer points than there are pixels
+  double frame_timeout_s = 30.0;    // from the end of a view's exposures to its last frame
+
+  static Result<ReconstructionServiceConfig> Load(ConfigTable table);
+};
+
+class ReconstructionService {
+ public:
+  ReconstructionService(StreamHub& hub, ServiceMonitor& monitor, const ReconstructionServiceConfig& config,
+                        PatternSet pattern, StereoCalibration calibration);
+
+ private:
+  using Key = std::pair<int, int>;  // part, view
+
+  ViewCollector* View(int part, int view);
+  void OnCaptured(const fsmsg::view_captured_t& captured);
+  void FinishIfSettled(Key key);
+  void Finish(Key key, const ViewCollector& view);
+  Result<Reconstruction> Run(const ViewCollector& view);
+  Status Publish(const fsmsg::view_result_t& result, const PointCloud& cloud);
+
+  StreamHub& hub_;
+  ServiceMonitor& monitor_;
+  ReconstructionServiceConfig config_;
+  PatternSet pattern_;
+  StereoCalibration calibration_;
+  std::unique_ptr<Reconstructor> reconstructor_;  // made with the first view, when the image size is known
+  ImageSize image_size_{};                        // for which it was made
+  std::map<Key, ViewCollector> views_;            // in work
+};
+
+}  // namespace forgescan

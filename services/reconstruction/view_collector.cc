@@ -1,0 +1,104 @@
+#include "services/reconstruction/view_collector.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace forgescan {
+
+bool ViewCollector::IsCurrent(int attempt) {
+  if (attempt > attempt_) {
+    *this = ViewCollector(frames_per_camera_);
+    attempt_ = attempt;
+  }
+  return attempt == attempt_;
+}
+
+ViewCollector::Camera* ViewCollector::CameraOf(int camera) {
+  const bool known = camera == fsmsg::exposure_t::CAMERA_LEFT || camera == fsmsg::exposure_t::CAMERA_RIGHT;
+  return known ? &cameras_[static_cast<std::size_t>(camera - fsmsg::exposure_t::CAMERA_LEFT)] : nullptr;
+}
+
+void ViewCollector::SetVoid(const std::string& reason) {
+  if (void_reason_.empty()) {
+    void_reason_ = reason;
+  }
+}
+
+void ViewCollector::OnCaptured(const fsmsg::view_captured_t& captured) {
+  if (IsCurrent(captured.attempt) && captured.status != fsmsg::view_captured_t::STATUS_CAPTURED) {
+    SetVoid(captured.reason);
+  }
+}
+
+void ViewCollector::OnManifest(const fsmsg::view_frames_t& manifest) {
+  Camera* camera = CameraOf(manifest.camera);
+  if (camera == nullptr || !IsCurrent(manifest.attempt)) {
+    return;
+  }
+  camera->manifest = manifest;
+  if (manifest.frames_missing > 0) {
+    SetVoid(manifest.reason);
+  } else if (manifest.frames_sent != frames_per_camera_) {
+    SetVoid(fmt::format("a camera sent {} frames, the sequence has {}", manifest.frames_sent,
+                        frames_per_camera_));
+  }
+}
+
+void ViewCollector::OnFrame(const fsmsg::frame_t& frame) {
+  Camera* camera = CameraOf(frame.camera);
+  if (camera == nullptr || !IsCurrent(frame.attempt)) {
+    return;
+  }
+  const bool shaped = frame.width_px > 0 && frame.height_px > 0 &&
+                      frame.data.size() == static_cast<std::size_t>(frame.width_px) *
+                                               static_cast<std::size_t>(frame.height_px);
+  if (!shaped || frame.pattern < 0 || frame.pattern >= frames_per_camera_) {
+    return SetVoid(fmt::format("a frame of pattern {} has {} bytes for {} x {} pixels; patterns are 0 to {}",
+                               frame.pattern, frame.data.size(), frame.width_px, frame.height_px,
+                               frames_per_camera_ - 1));
+  }
+  camera->frames[frame.pattern] = frame;
+}
+
+void ViewCollector::Expire(const std::string& reason) {
+  if (state() == State::kCollecting) {
+    SetVoid(reason);
+  }
+}
+
+ViewCollector::State ViewCollector::state() const {
+  if (!void_reason_.empty()) {
+    return State::kVoid;
+  }
+  const bool complete = std::all_of(cameras_.begin(), cameras_.end(), [this](const Camera& camera) {
+    return camera.manifest.has_value() && static_cast<int>(camera.frames.size()) == frames_per_camera_;
+  });
+  return complete ? State::kComplete : State::kCollecting;
+}
+
+int ViewCollector::frames_received() const {
+  return static_cast<int>(cameras_[0].frames.size() + cameras_[1].frames.size());
+}
+
+std::int64_t ViewCollector::middle_utime() const {
+  std::int64_t first = 0, last = 0;
+  for (const Camera& camera : cameras_) {
+    for (const auto& [pattern, frame] : camera.frames) {
+      first = first == 0 ? frame.utime : std::min(first, frame.utime);
+      last = std::max(last, frame.utime);
+    }
+  }
+  return first + (last - first) / 2;
+}
+
+std::vector<const fsmsg::frame_t*> ViewCollector::Frames(int camera) const {
+  std::vector<const fsmsg::frame_t*> frames;
+  for (const auto& [pattern, frame] :
+       cameras_[static_cast<std::size_t>(camera - fsmsg::exposure_t::CAMERA_LEFT)].frames) {
+    frames.push_back(&frame);
+  }
+  return frames;
+}
+
+}  // namespace forgescan

@@ -1,0 +1,61 @@
+// Collects the frames of one view from both cameras until it is complete or known to be void. Pure: no bus,
+// no clock.
+//
+//              frames, manifests, "captured" in any order
+//   collecting ------------------------------------------> complete   every frame of both cameras is there
+//        |   void capture, frames missing, contradictions
+//        +-----------------------------------------------> void       with the reason; also by Expire()
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "fsmsg/exposure_t.hpp"
+#include "fsmsg/frame_t.hpp"
+#include "fsmsg/view_captured_t.hpp"
+#include "fsmsg/view_frames_t.hpp"
+
+namespace forgescan {
+
+class ViewCollector {
+ public:
+  // frames_per_camera: length of the projected sequence.
+  explicit ViewCollector(int frames_per_camera) : frames_per_camera_(frames_per_camera) {}
+
+  void OnCaptured(const fsmsg::view_captured_t& captured);
+  void OnManifest(const fsmsg::view_frames_t& manifest);
+  void OnFrame(const fsmsg::frame_t& frame);
+  // The view is void for this reason unless it is complete.
+  void Expire(const std::string& reason);
+
+  enum class State { kCollecting, kComplete, kVoid };
+  State state() const;
+  const std::string& void_reason() const { return void_reason_; }
+  int frames_received() const;
+  // Middle of the view's exposures; 0 without a frame.
+  std::int64_t middle_utime() const;
+  int attempt() const { return attempt_; }
+  // Frames of a camera (exposure_t.CAMERA_*) in the order of the projected sequence. Only when complete.
+  std::vector<const fsmsg::frame_t*> Frames(int camera) const;
+
+ private:
+  struct Camera {
+    std::map<int, fsmsg::frame_t> frames;  // by pattern
+    std::optional<fsmsg::view_frames_t> manifest;
+  };
+  // True if the event belongs to the newest attempt; a newer one starts the collection afresh.
+  bool IsCurrent(int attempt);
+  Camera* CameraOf(int camera);
+  void SetVoid(const std::string& reason);
+
+  int frames_per_camera_;
+  int attempt_ = 0;
+  std::array<Camera, 2> cameras_;  // left, right
+  std::string void_reason_;
+};
+
+}  // namespace forgescan

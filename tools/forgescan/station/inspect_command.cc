@@ -1,0 +1,189 @@
+// forgescan inspect: parts on the virtual station, from the empty cell to the report.
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdio>
+#include <ctime>
+#include <filesystem>
+
+#include "services/common/bus/channels.h"
+#include "services/common/model/bundle_file.h"
+#include "services/common/model/model_import.h"
+#include "services/common/bus/stream_hub.h"
+#include "tools/forgescan/command.h"
+#include "tools/forgescan/station/interrupt.h"
+#include "tools/forgescan/station/network.h"
+#include "tools/forgescan/station/station_runner.h"
+
+namespace forgescan {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::int64_t kReadyPatienceUs = 60'000'000;
+
+struct InspectOptions {
+  int parts = 1;
+  std::string station = "stations/virtual";
+  std::string out = "runs";
+  std::string cell = "cell.toml";
+  double part_patience_s = 300.0;
+};
+
+// The outcome of every part, in the order of the verdicts.
+class Progress {
+ public:
+  Progress(StreamHub& hub) : start_us_(hub.bus().NowUs()), hub_(hub) {
+    hub.Subscribe<fsmsg::part_arrived_t>(
+        kPartArrived, [this](const auto& m) { Say(m.part, "in place, {} views", m.view_count); });
+    hub.Subscribe<fsmsg::view_captured_t>(kViewCaptured, [this](const auto& m) {
+      const bool captured = m.status == fsmsg::view_captured_t::STATUS_CAPTURED;
+      Say(m.part, "view {} {}", m.view, captured ? "captured" : "VOID: " + m.reason);
+    });
+    hub.Subscribe<fsmsg::view_result_t>(kViewResult, [this](const auto& m) {
+      const bool ok = m.status == fsmsg::view_result_t::STATUS_OK;
+      Say(m.part, "view {} {}", m.view, ok ? fmt::format("{} points", m.points) : "VOID: " + m.reason);
+    });
+    hub.Subscribe<fsmsg::scan_complete_t>(kScanComplete, [this](const auto& m) {
+      Say(m.part, "scan {}", m.reason.empty() ? "complete" : "ABORTED: " + m.reason);
+    });
+    hub.Subscribe<fsmsg::registration_t>(kRegistration, [this](const auto& m) {
+      const bool ok = m.status == fsmsg::registration_t::STATUS_CONVERGED;
+      Say(m.part, "registration {}",
+          ok ? fmt::format("rms {:.3f} mm, {:.0f} % foreign points", m.rms_mm, 100 * m.foreign_share)
+             : "FAILED: " + m.reason);
+    });
+    hub.Subscribe<fsmsg::verdict_t>(kVerdict, [this](const auto& m) {
+      Say(m.part, "verdict {}{}{}", VerdictName(m.verdict), m.reason.empty() ? "" : ": ", m.reason);
+      verdicts_.push_back(m);
+    });
+    hub.Subscribe<fsmsg::part_sorted_t>(kPartSorted,
+                                        [this](const auto& m) { sorted_ += m.acknowledged == 1 ? 1 : 0; });
+  }
+
+  const std::vector<fsmsg::verdict_t>& verdicts() const { return verdicts_; }
+  int sorted() const { return sorted_; }
+
+ private:
+  static const char* VerdictName(int verdict) {
+    constexpr const char* kNames[] = {"UNKNOWN", "OK", "NOT_OK", "NOT_DECIDABLE", "NOT_INSPECTED"};
+    return verdict >= 0 && verdict < 5 ? kNames[verdict] : "UNKNOWN";
+  }
+  template <typename... Args>
+  void Say(int part, fmt::format_string<Args...> format, Args&&... args) {
+    const double since_s = static_cast<double>(hub_.bus().NowUs() - start_us_) * 1e-6;
+    fmt::print("{:7.2f} s  part {}  {}\n", since_s, part, fmt::format(format, std::forward<Args>(args)...));
+    std::fflush(stdout);
+  }
+
+  std::int64_t start_us_;
+  StreamHub& hub_;
+  std::vector<fsmsg::verdict_t> verdicts_;
+  int sorted_ = 0;
+};
+
+Result<fs::path> MakeRunFolder(const std::string& base) {
+  const std::time_t now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
+  char name[32];
+  std::strftime(name, sizeof name, "%Y%m%d-%H%M%S", std::gmtime(&now));
+  for (int attempt = 0; attempt < 100; ++attempt) {
+    const fs::path folder =
+        fs::absolute(fs::path(base) / (attempt == 0 ? name : fmt::format("{}-{}", name, attempt)));
+    std::error_code problem;
+    if (fs::create_directories(folder, problem)) {
+      return folder;
+    }
+    if (problem) {
+      return Fail(ErrorCode::kIo, "{} cannot be made: {}", folder.string(), problem.message());
+    }
+  }
+  return Fail(ErrorCode::kIo, "no new folder can be made in {}", base);
+}
+
+// The truth goes beside the report only now, when every service is done with the part.
+Status PublishTruth(const fs::path& run, const fsmsg::verdict_t& verdict) {
+  const fs::path truth = run / "truth" / fmt::format("part_{:06}.json", verdict.part);
+  std::error_code problem;
+  fs::copy_file(truth, fs::path(verdict.report_folder) / "truth.json", fs::copy_options::overwrite_existing,
+                problem);
+  if (problem) {
+    return Fail(ErrorCode::kIo, "{} cannot be copied to {}: {}", truth.string(), verdict.report_folder,
+                problem.message());
+  }
+  fmt::print("report {}\n", verdict.report_folder);
+  return {};
+}
+
+Status InspectParts(StationRunner& runner, ProcessGroup& cell, const InspectOptions& options,
+                    const fs::path& run) {
+  StreamHub hub(runner.bus(), "inspect");
+  const Progress progress(hub);
+  const Interrupt interrupt;
+  RETURN_IF_ERROR(
+      cell.Start("virtual_station", {ProgramFolder() + "/forgescan-virtual-station", "run", "--run",
+                                     run.string(), "--parts", std::to_string(options.parts)}));
+  RETURN_IF_ERROR(runner.WaitUntilReady(kReadyPatienceUs));
+  const auto patience_us = static_cast<std::int64_t>(options.part_patience_s * 1e6) * options.parts;
+  const std::int64_t until_us = runner.bus().NowUs() + patience_us;
+  while (progress.sorted() < options.parts) {
+    RETURN_IF_ERROR(runner.RunFor(100'000));
+    if (interrupt.Requested()) {
+      return Fail(ErrorCode::kUnavailable, "interrupted");
+    }
+    if (runner.bus().NowUs() > until_us) {
+      return Fail(ErrorCode::kTimeout, "{} of {} parts were sorted within {} s; {} has the logs",
+                  progress.sorted(), options.parts, patience_us / 1'000'000, run.string());
+    }
+    if (const std::string ended = cell.Ended(); !ended.empty() && progress.sorted() < options.parts) {
+      return Fail(ErrorCode::kUnavailable, "{}", ended);
+    }
+  }
+  fmt::print("\n{}\n", runner.Table(140, false));
+  for (const fsmsg::verdict_t& verdict : progress.verdicts()) {
+    RETURN_IF_ERROR(PublishTruth(run, verdict));
+  }
+  return {};
+}
+
+Status Prepare(const InspectOptions& options, const fs::path& run) {
+  ProcessGroup prepare((run / "log").string());
+  RETURN_IF_ERROR(prepare.Start("virtual_station_prepare",
+                                {ProgramFolder() + "/forgescan-virtual-station", "prepare", "--station",
+                                 options.station, "--cell", options.cell, "--run", run.string()}));
+  RETURN_IF_ERROR(prepare.WaitForSuccess());
+  ASSIGN_OR_RETURN(const Station station, Station::Load((run / "station").string()));
+  ASSIGN_OR_RETURN(const ModelBundle model, LoadModel(run / "station" / "model" / "axle.step", {}));
+  return WriteBundle(model, station.model);
+}
+
+Status Inspect(const InspectOptions& options) {
+  if (!HasMulticastRoute()) {
+    RETURN_IF_ERROR(EnterPrivateNetwork());
+  }
+  ASSIGN_OR_RETURN(const fs::path run, MakeRunFolder(options.out));
+  RETURN_IF_ERROR(Prepare(options, run));
+  ProcessGroup cell((run / "log").string());
+  ASSIGN_OR_RETURN(const auto runner, StationRunner::Start((run / "station").string()));
+  const Status status = InspectParts(*runner, cell, options, run);
+  runner->Stop();
+  cell.Stop();
+  return status;
+}
+
+}  // namespace
+
+void AddInspectCommand(CLI::App& app, Status& outcome) {
+  static InspectOptions options;
+  CLI::App* command = app.add_subcommand("inspect", "inspect parts on the virtual station");
+  command->add_option("--parts", options.parts, "number of parts")->check(CLI::Range(1, 10'000));
+  command->add_option("--station", options.station, "folder of the station to simulate")
+      ->check(CLI::ExistingDirectory);
+  command->add_option("--cell", options.cell, "imperfections of the cell: a file of the station's folder");
+  command->add_option("--out", options.out, "folder for the runs");
+  command->add_option("--patience", options.part_patience_s, "seconds a part may take")
+      ->check(CLI::Range(1.0, 1e5));
+  command->callback([&outcome] { outcome = Inspect(options); });
+}
+
+}  // namespace forgescan

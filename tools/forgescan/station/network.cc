@@ -1,0 +1,123 @@
+#include "tools/forgescan/station/network.h"
+
+#include <arpa/inet.h>
+#include <fcntl.h>
+#include <net/if.h>
+#include <net/route.h>
+#include <sched.h>
+#include <sys/ioctl.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+
+namespace forgescan {
+namespace {
+
+// LCM's default group, and python-can's for CAN over UDP.
+constexpr const char* kGroups[] = {"239.255.76.67", "239.74.163.2"};
+
+class Socket {
+ public:
+  Socket() : fd_(socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {}
+  ~Socket() { close(fd_); }
+  Socket(const Socket&) = delete;
+  Socket& operator=(const Socket&) = delete;
+  int fd() const { return fd_; }
+
+ private:
+  int fd_;
+};
+
+sockaddr_in Address(const char* text) {
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_port = htons(7667);
+  inet_pton(AF_INET, text, &address.sin_addr);
+  return address;
+}
+
+Status Refused(const char* what) {
+  return Fail(ErrorCode::kUnavailable, "a private network for the station cannot be made: {}: {}", what,
+              std::strerror(errno));
+}
+
+Status RaiseLoopback(int fd) {
+  ifreq request{};
+  std::strncpy(request.ifr_name, "lo", IFNAMSIZ - 1);
+  request.ifr_flags = IFF_UP | IFF_RUNNING;
+  return ioctl(fd, SIOCSIFFLAGS, &request) == 0 ? Status() : Refused("raising loopback");
+}
+
+Status RouteToLoopback(int fd, const char* group) {
+  rtentry route{};
+  const sockaddr_in to = Address(group), mask = Address("255.255.255.255");
+  char device[] = "lo";
+  std::memcpy(&route.rt_dst, &to, sizeof to);
+  std::memcpy(&route.rt_genmask, &mask, sizeof mask);
+  route.rt_flags = RTF_UP | RTF_HOST;
+  route.rt_dev = device;
+  return ioctl(fd, SIOCADDRT, &route) == 0 ? Status() : Refused("adding a multicast route");
+}
+
+// Keeps the user's own identity inside the new user namespace.
+Status MapUser(uid_t uid, gid_t gid) {
+  std::ofstream("/proc/self/setgroups") << "deny";
+  std::ofstream users("/proc/self/uid_map"), groups("/proc/self/gid_map");
+  users << "0 " << uid << " 1" << std::flush;
+  groups << "0 " << gid << " 1" << std::flush;
+  return users.good() && groups.good() ? Status() : Refused("mapping the user");
+}
+
+}  // namespace
+
+bool HasMulticastRoute() {
+  const Socket socket;
+  const sockaddr_in to = Address(kGroups[0]);
+  sockaddr_in from{};
+  socklen_t length = sizeof from;
+  return connect(socket.fd(), reinterpret_cast<const sockaddr*>(&to), sizeof to) == 0 &&
+         getsockname(socket.fd(), reinterpret_cast<sockaddr*>(&from), &length) == 0 &&
+         from.sin_addr.s_addr == htonl(INADDR_LOOPBACK);
+}
+
+Status EnterPrivateNetwork() {
+  const uid_t uid = getuid();
+  const gid_t gid = getgid();
+  const int kinds = uid == 0 ? CLONE_NEWNET : CLONE_NEWUSER | CLONE_NEWNET;
+  if (unshare(kinds) != 0) {
+    return Refused("unshare");
+  }
+  if (uid != 0) {
+    RETURN_IF_ERROR(MapUser(uid, gid));
+  }
+  const Socket socket;
+  RETURN_IF_ERROR(RaiseLoopback(socket.fd()));
+  for (const char* group : kGroups) {
+    RETURN_IF_ERROR(RouteToLoopback(socket.fd(), group));
+  }
+  return {};
+}
+
+Status JoinNetworkOf(int pid) {
+  const std::string base = "/proc/" + std::to_string(pid) + "/ns/";
+  for (const auto& [kind, flag] : {std::pair{"user", CLONE_NEWUSER}, std::pair{"net", CLONE_NEWNET}}) {
+    const int fd = open((base + kind).c_str(), O_RDONLY | O_CLOEXEC);
+    if (fd < 0) {
+      return Fail(ErrorCode::kNotFound, "process {} is not running", pid);
+    }
+    const int outcome = setns(fd, flag);
+    const int problem = errno;
+    close(fd);
+    // Joining the user namespace one is already in is refused with EINVAL, and needed only where it differs.
+    if (outcome != 0 && !(flag == CLONE_NEWUSER && problem == EINVAL)) {
+      return Fail(ErrorCode::kUnavailable, "the network of process {} cannot be joined: {}", pid,
+                  std::strerror(problem));
+    }
+  }
+  return {};
+}
+
+}  // namespace forgescan
