@@ -143,7 +143,7 @@ CoolingController::Judgement CoolingController::Judge(std::int64_t now_us) {
 }
 
 CoolingOutput CoolingController::Tick(std::int64_t now_us) {
-  const double dt_s = std::clamp(Seconds(now_us - last_tick_us_), 0.0, kLongestTick_s);
+  const double dt_s = std::clamp(Seconds(now_us - last_tick_us_.value_or(now_us)), 0.0, kLongestTick_s);
   last_tick_us_ = now_us;
   fresh_ = input_ && Seconds(now_us - input_->utime) <= config_.stale_s;
   const bool sighted = fresh_ && std::isfinite(inside_degc_);

@@ -85,7 +85,7 @@ class CoolingController {
   bool dew_latched_ = false;
   std::optional<std::int64_t> blind_since_us_;
   std::optional<std::int64_t> no_flow_since_us_;
-  std::int64_t last_tick_us_ = 0;
+  std::optional<std::int64_t> last_tick_us_;
 };
 
 }  // namespace forgescan

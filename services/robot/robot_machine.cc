@@ -119,20 +119,15 @@ RobotMachine::Actions RobotMachine::Approach(std::int64_t now_us) {
 }
 
 RobotMachine::Actions RobotMachine::OnLink(bool up, std::int64_t now_us) {
-  if (!up) {
-    Actions actions;
-    if (scanning()) {
-      phase_ = RobotPhase::kOffline;
-      actions.emplace_back(ScanFinished{now_us, start_us_, part_, path_ ? path_->view_count : 0, captured_,
-                                        "the robot controller stopped answering"});
-    }
-    phase_ = RobotPhase::kOffline;
-    status_.reset();
-    path_.reset();
-    return actions;
+  Actions actions;
+  if (scanning()) {
+    actions.emplace_back(ScanFinished{now_us, start_us_, part_, path_ ? path_->view_count : 0, captured_,
+                                      "the robot controller stopped answering"});
   }
-  phase_ = RobotPhase::kHoming;
-  return GoHome(now_us);
+  phase_ = up ? RobotPhase::kHoming : RobotPhase::kOffline;  // homing begins with the first status
+  status_.reset();
+  path_.reset();
+  return actions;
 }
 
 RobotMachine::Actions RobotMachine::OnPath(const RobotPath& path) {
@@ -186,7 +181,13 @@ bool RobotMachine::Echoed(const RobotStatus& status) const {
 }
 
 RobotMachine::Actions RobotMachine::OnStatus(const RobotStatus& status) {
+  const bool first = !status_.has_value();
   status_ = status;
+  if (first) {  // orders go on from the controller's number: one it has had before would be taken for a
+                // repetition
+    order_.seq = status.seq_echo;
+    return GoHome(status.utime);
+  }
   if (scanning() && (status.state == RobotState::kFault || status.protective_stop)) {
     return Abort("the robot was stopped by a fault or its safety", status.utime);
   }
@@ -266,7 +267,7 @@ RobotMachine::Actions RobotMachine::OnInterlock(bool stop, const std::string& re
 }
 
 RobotMachine::Actions RobotMachine::OnTick(std::int64_t now_us) {
-  const bool ordered = scanning() || phase_ == RobotPhase::kHoming;
+  const bool ordered = status_.has_value() && (scanning() || phase_ == RobotPhase::kHoming);
   if (ordered && !echoed_ && now_us >= echo_deadline_us_) {
     if (sent_ > config_.resends && phase_ == RobotPhase::kHoming) {
       return GoHome(now_us);  // nothing else to do: keep asking until it answers or the link goes down

@@ -1,9 +1,9 @@
 // One part at a time along the taught path. Pure: events with their time in, actions out.
 //
-//   offline --link up--> homing --home--> ready --part in place--> selecting --echo--> approaching
-//   approaching --in position and settled--> capturing --captured--> approaching (next view) ... --last-->
-//   homing approaching, capturing, selecting: fault, interlock, part gone, timeout -> scan aborted, homing
-//   (or fault) fault --controller clear of its fault--> homing any: link lost -> scan aborted, offline
+//   offline --link up, first status--> homing --home--> ready --part in place--> selecting --echo-->
+//   approaching approaching --in position and settled--> capturing --captured--> approaching (next view) ...
+//   --last--> homing approaching, capturing, selecting: fault, interlock, part gone, timeout -> scan aborted,
+//   homing (or fault) fault --controller clear of its fault--> homing any: link lost -> scan aborted, offline
 #pragma once
 
 #include <optional>

@@ -54,11 +54,10 @@ TriggerMachine::Actions TriggerMachine::Void(const std::string& reason, std::int
 
 TriggerMachine::Actions TriggerMachine::OnLink(bool up, std::int64_t now_us) {
   const bool was_active = active();
-  phase_ = up ? TriggerPhase::kIdle : TriggerPhase::kOffline;
-  if (!up) {
-    clock_.Reset();
-    pulse_count_ = {};
-  }
+  link_up_ = up;
+  phase_ = TriggerPhase::kOffline;  // idle begins with the first status
+  clock_.Reset();
+  pulse_count_ = {};
   return was_active ? Void("the trigger microcontroller stopped answering", now_us) : Actions{};
 }
 
@@ -108,6 +107,11 @@ void TriggerMachine::Accept(std::int64_t now_us) {
 
 TriggerMachine::Actions TriggerMachine::OnStatus(const TriggerStatus& status) {
   clock_.OnStatus(status.device_time_us, status.utime);
+  if (link_up_ && phase_ == TriggerPhase::kOffline) {
+    seq_ = status.seq_echo;  // commands go on from its number: one it has had before would be taken for a
+                             // repetition
+    phase_ = TriggerPhase::kIdle;
+  }
   if (phase_ == TriggerPhase::kArming && status.seq_echo == seq_) {
     Accept(status.utime);
   }

@@ -1,7 +1,7 @@
 // The sequence of one view: command, echo, pulses, records, done or void. Pure: events with their time in,
 // actions out.
 //
-//   offline --link up--> idle --view ready--> arming --echo--> firing --all records--> idle
+//   offline --link up, first status--> idle --view ready--> arming --echo--> firing --all records--> idle
 //   arming: no echo after the resends, firing: records missing at the deadline, position lost, interlock ->
 //   void, idle any: link lost -> void if a view was under way, offline
 #pragma once
@@ -43,7 +43,7 @@ struct ViewOutcome {
   bool captured = false;
   std::int32_t pulses_expected = 0;      // of each camera
   std::array<std::int32_t, 2> pulses{};  // left, right: recorded
-  std::string reason = {};                    // empty when captured
+  std::string reason = {};               // empty when captured
 };
 
 // An event that does not belong into the present phase; counted and shown, otherwise without effect.
@@ -83,6 +83,7 @@ class TriggerMachine {
   TriggerConfig config_;
   TriggerPlan plan_;
   TriggerPhase phase_ = TriggerPhase::kOffline;
+  bool link_up_ = false;
   DeviceClock clock_;
   ViewRequest view_;
   std::uint16_t seq_ = 0;
