@@ -13,7 +13,7 @@ enum class MaskCause : std::uint8_t {
   kValid,
   kSaturated,
   kLowModulation,
-  kNoisy,            // sigma / B too large
+  kNoisy,            // predicted phase sigma too large
   kModulationRatio,  // the frequencies' modulations do not fit together: a disturbed frame or background
   kReference,        // the reference frame does not fit
   kOutOfRange,       // outside the projector's field, or where fringe orders wrap
@@ -39,8 +39,8 @@ struct DecodedView {
   cv::Mat_<std::uint8_t> cause;           // MaskCause
   std::array<long, kMaskCauses> count{};  // pixels by cause; their sum is the image
   long repaired = 0;  // valid pixels whose fringe order was doubtful and came from their neighbours
-  double median_modulation_dn = 0;        // over valid pixels
-  double median_noise_to_modulation = 0;  // predicted sigma / B, median over valid pixels
+  double median_modulation_dn = 0;  // over valid pixels
+  double median_sigma_px = 0;       // over valid pixels
 };
 
 }  // namespace forgescan

@@ -1,8 +1,10 @@
 #include "services/reconstruction/fringe_decoder.h"
 
 #include <algorithm>
+#include <functional>
 #include <memory>
 #include <utility>
+#include <vector>
 
 #include "services/common/parallel_rows.h"
 #include "services/reconstruction/fringe_order_repair.h"
@@ -33,23 +35,36 @@ void Store(const StripDecoder& strip, int row, int column, int length, DecodedVi
   }
 }
 
-void Count(const CameraNoise& noise, DecodedView& view) {
+void CountCauses(int threads, DecodedView& view) {
+  std::vector<std::array<long, kMaskCauses>> rows(static_cast<std::size_t>(view.cause.rows));
+  ParallelRows(threads, view.cause.rows, [&](int begin, int end) {
+    for (int row = begin; row < end; ++row) {
+      const std::uint8_t* const cause = view.cause[row];
+      for (int column = 0; column < view.cause.cols; ++column) {
+        ++rows[static_cast<std::size_t>(row)][cause[column]];
+      }
+    }
+  });
+  for (const auto& row : rows) {
+    std::transform(row.begin(), row.end(), view.count.begin(), view.count.begin(), std::plus<>());
+  }
+}
+
+void TakeMedians(DecodedView& view) {
+  constexpr int kRowStep = 8;  // every eighth row is plenty for a median
   HistogramMedian modulation(0, 256, 4096);
-  HistogramMedian ratio(0, 0.2, 4000);
-  const double level_sigma = std::sqrt(noise.read_noise_dn * noise.read_noise_dn + noise.gain_dn * 128);
-  for (int row = 0; row < view.cause.rows; ++row) {
+  HistogramMedian sigma(0, 2, 4000);
+  for (int row = kRowStep / 2; row < view.cause.rows; row += kRowStep) {
     for (int column = 0; column < view.cause.cols; ++column) {
-      const std::uint8_t cause = view.cause(row, column);
-      ++view.count[cause];
-      if (cause == static_cast<std::uint8_t>(MaskCause::kValid)) {
-        modulation.Add(view.modulation_dn(row, column));
-        ratio.Add(level_sigma / view.modulation_dn(row, column));
+      if (view.cause(row, column) == static_cast<std::uint8_t>(MaskCause::kValid)) {
+        modulation.Add(static_cast<double>(view.modulation_dn(row, column)));
+        sigma.Add(static_cast<double>(view.sigma_px(row, column)));
       }
     }
   }
   if (modulation.total() > 0) {
     view.median_modulation_dn = modulation.Median();
-    view.median_noise_to_modulation = ratio.Median();
+    view.median_sigma_px = sigma.Median();
   }
 }
 
@@ -108,7 +123,8 @@ Result<DecodedView> FringeDecoder::Decode(std::span<const cv::Mat> frames) const
   view.repaired = RepairFringeOrders(
       view, pattern_.frequencies[static_cast<std::size_t>(table_.base)].period_px, config_);
   DropMaskBorder(view, config_);
-  Count(config_.noise, view);
+  CountCauses(config_.threads, view);
+  TakeMedians(view);
   return view;
 }
 

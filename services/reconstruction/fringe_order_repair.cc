@@ -6,6 +6,8 @@
 #include <optional>
 #include <vector>
 
+#include "services/common/parallel_rows.h"
+
 namespace forgescan {
 namespace {
 
@@ -36,34 +38,62 @@ std::optional<float> MedianOfNeighbours(const DecodedView& view, int row, int co
   return values[static_cast<std::size_t>(count / 2)];
 }
 
-}  // namespace
+// Repairs of one row, decided on the view as it is.
+class RowRepair {
+ public:
+  RowRepair(const DecodedView& view, double period_px, const ReconstructionConfig& config)
+      : view_(view),
+        period_px_(static_cast<float>(period_px)),
+        tolerance_px_(static_cast<float>(config.repair_tolerance_periods * period_px)),
+        min_neighbours_(config.repair_min_neighbours) {}
 
-long RepairFringeOrders(DecodedView& view, double period_px, const ReconstructionConfig& config) {
-  constexpr auto kDoubtful = static_cast<std::uint8_t>(MaskCause::kUnwrapMargin);
-  const auto period = static_cast<float>(period_px);
-  const auto tolerance_px = static_cast<float>(config.repair_tolerance_periods) * period;
-  std::vector<Repair> repairs;
-  for (int row = 0; row < view.cause.rows; ++row) {
-    for (int column = 0; column < view.cause.cols; ++column) {
-      if (view.cause(row, column) != kDoubtful) {
+  std::vector<Repair> Row(int row) const {
+    constexpr auto kDoubtful = static_cast<std::uint8_t>(MaskCause::kUnwrapMargin);
+    std::vector<Repair> repairs;
+    const std::uint8_t* const cause = view_.cause[row];
+    for (int column = 0; column < view_.cause.cols; ++column) {
+      if (cause[column] != kDoubtful) {
         continue;
       }
-      const auto median = MedianOfNeighbours(view, row, column, config.repair_min_neighbours);
+      const auto median = MedianOfNeighbours(view_, row, column, min_neighbours_);
       if (!median) {
         continue;
       }
-      const float coordinate = view.coordinate_px(row, column);
-      const float moved = coordinate - period * std::round((coordinate - *median) / period);
-      if (std::abs(moved - *median) <= tolerance_px) {
+      const float coordinate = view_.coordinate_px(row, column);
+      const float moved = coordinate - period_px_ * std::round((coordinate - *median) / period_px_);
+      if (std::abs(moved - *median) <= tolerance_px_) {
         repairs.push_back({row, column, moved});
       }
     }
+    return repairs;
   }
-  for (const Repair& repair : repairs) {
-    view.coordinate_px(repair.row, repair.column) = repair.coordinate_px;
-    view.cause(repair.row, repair.column) = kValid;
+
+ private:
+  const DecodedView& view_;
+  float period_px_;
+  float tolerance_px_;
+  int min_neighbours_;
+};
+
+}  // namespace
+
+long RepairFringeOrders(DecodedView& view, double period_px, const ReconstructionConfig& config) {
+  const RowRepair repair(view, period_px, config);
+  std::vector<std::vector<Repair>> rows(static_cast<std::size_t>(view.cause.rows));
+  ParallelRows(config.threads, view.cause.rows, [&](int begin, int end) {
+    for (int row = begin; row < end; ++row) {
+      rows[static_cast<std::size_t>(row)] = repair.Row(row);
+    }
+  });
+  long count = 0;
+  for (const auto& row : rows) {
+    for (const Repair& one : row) {
+      view.coordinate_px(one.row, one.column) = one.coordinate_px;
+      view.cause(one.row, one.column) = kValid;
+      ++count;
+    }
   }
-  return static_cast<long>(repairs.size());
+  return count;
 }
 
 void DropMaskBorder(DecodedView& view, const ReconstructionConfig& config) {

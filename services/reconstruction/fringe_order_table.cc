@@ -100,10 +100,9 @@ Result<FringeOrderTable> MakeFringeOrderTable(const PatternSet& pattern, double 
   RETURN_IF_ERROR(Check(pattern));
   FringeOrderTable table = OrderFrequencies(pattern);
   const double period_px = pattern.frequencies[static_cast<std::size_t>(table.base)].period_px;
-  const double first_px = -0.5;  // left edge of the first column
-  const double last_px = pattern.projector_width_px - 0.5;
-  int first = static_cast<int>(std::floor((first_px - pattern.phase_origin_px) / period_px));
-  int last = static_cast<int>(std::ceil((last_px - pattern.phase_origin_px) / period_px)) - 1;
+  const double last_column_px = pattern.projector_width_px - 1;
+  int first = static_cast<int>(std::floor((0 - pattern.phase_origin_px) / period_px));
+  int last = static_cast<int>(std::floor((last_column_px - pattern.phase_origin_px) / period_px));
   const double least_cost = MinStepCost(table, 1, std::max(last - first, 1));
   table.separation_rad = RadFromCost(least_cost);
   if (table.separation_rad < kMinSeparationRad) {
@@ -112,8 +111,8 @@ Result<FringeOrderTable> MakeFringeOrderTable(const PatternSet& pattern, double 
         "the periods of the pattern set tell its {} fringe orders apart by {:.3f} rad only, limit {} rad",
         last - first + 1, table.separation_rad, kMinSeparationRad);
   }
-  table.first_px = static_cast<float>(first_px);
-  table.last_px = static_cast<float>(last_px);
+  table.first_px = -0.5F;  // left edge of the first column
+  table.last_px = static_cast<float>(last_column_px + 0.5);
   // A pixel just outside the field belongs to the order before the first or after the last. Where that order
   // has a code of its own it joins the table, and such pixels fall out of range; where it does not, an edge
   // of the field stays dead.

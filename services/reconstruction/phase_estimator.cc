@@ -26,8 +26,7 @@ std::vector<double> FusionWeights(const PhaseEstimator& estimator, const Pattern
   std::vector<double> weights;
   double sum = 0;
   for (std::size_t j = 0; j < pattern.frequencies.size(); ++j) {
-    const auto row = static_cast<Eigen::Index>(j);
-    const double noise = estimator.cosine.row(row).squaredNorm() + estimator.sine.row(row).squaredNorm();
+    const double noise = std::pow(estimator.PhaseNoise(static_cast<int>(j)), 2);
     const double scale = pattern.frequencies[j].period_px / pattern.frequencies[j].modulation_ratio;
     weights.push_back(1 / (noise * scale * scale));
     sum += weights.back();
@@ -39,6 +38,10 @@ std::vector<double> FusionWeights(const PhaseEstimator& estimator, const Pattern
 }
 
 }  // namespace
+
+double PhaseEstimator::PhaseNoise(int frequency) const {
+  return std::sqrt((cosine.row(frequency).squaredNorm() + sine.row(frequency).squaredNorm()) / 2);
+}
 
 Result<PhaseEstimator> MakePhaseEstimator(const PatternSet& pattern) {
   RETURN_IF_ERROR(Check(pattern));

@@ -22,6 +22,10 @@ struct PhaseEstimator {
   int redundancy = 0;        // frames minus unknowns
   std::vector<double>
       fusion;  // weights of the frequencies' coordinates, sum 1: best for phases of average variance
+
+  // Standard deviation of a phase over sigma / B (sigma of a grey value), averaged over all phases: 0.71 for
+  // 4 own frames, 1.0 and 1.22 for 3-2-2 shared ones.
+  double PhaseNoise(int frequency) const;
 };
 
 // Errors: kInvalidArgument from Check(pattern); kDegenerate when the shifts do not determine the phases.

@@ -1,6 +1,8 @@
 #include "services/reconstruction/reconstruct.h"
 
+#include <algorithm>
 #include <cmath>
+#include <opencv2/core.hpp>
 #include <utility>
 
 #include "services/reconstruction/disparity.h"
@@ -13,6 +15,15 @@ namespace {
 
 Error InCamera(const char* name, const Error& error) {
   return Error{error.code, fmt::format("{} camera: {}", name, error.message), error.where};
+}
+
+// Two cameras never see the same noise: equal frames are one camera given twice.
+bool AreSame(std::span<const cv::Mat> left, std::span<const cv::Mat> right) {
+  return std::equal(left.begin(), left.end(), right.begin(), right.end(),
+                    [](const cv::Mat& a, const cv::Mat& b) {
+                      return !a.empty() && a.size() == b.size() && a.type() == b.type() &&
+                             cv::norm(a, b, cv::NORM_INF) == 0;
+                    });
 }
 
 double MedianSigmaMm(const PointCloud& cloud) {
@@ -53,13 +64,16 @@ Result<Reconstructor::Camera> Reconstructor::DecodeCamera(std::span<const cv::Ma
   const CameraQuality quality = {.pixels = view->count,
                                  .repaired = view->repaired,
                                  .median_modulation_dn = view->median_modulation_dn,
-                                 .median_noise_to_modulation = view->median_noise_to_modulation,
+                                 .median_sigma_px = view->median_sigma_px,
                                  .trust = *trust};
   return Camera{std::move(view).value(), quality};
 }
 
 Result<Reconstruction> Reconstructor::Run(std::span<const cv::Mat> left,
                                           std::span<const cv::Mat> right) const {
+  if (AreSame(left, right)) {
+    return Fail(ErrorCode::kInvalidArgument, "the left and the right frames are the same images");
+  }
   ASSIGN_OR_RETURN(const Camera left_camera, DecodeCamera(left, "left"));
   ASSIGN_OR_RETURN(const Camera right_camera, DecodeCamera(right, "right"));
   const RectifiedView left_view = RectifyCoordinates(left_camera.view, rig_.left_map, config_);

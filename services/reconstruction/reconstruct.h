@@ -22,7 +22,7 @@ struct CameraQuality {
   std::array<long, kMaskCauses> pixels{};  // by MaskCause
   long repaired = 0;
   double median_modulation_dn = 0;
-  double median_noise_to_modulation = 0;
+  double median_sigma_px = 0;
   TrustFigures trust;
 };
 

@@ -22,7 +22,7 @@ Status Check(const ReconstructionConfig& c) {
       Range{"saturation_fraction", c.saturation_fraction, 0.1, 1},
       Range{"min_modulation_dn", c.min_modulation_dn, 0.1, 127},
       Range{"min_modulation_sigma", c.min_modulation_sigma, 0, 1000},
-      Range{"max_noise_to_modulation", c.max_noise_to_modulation, 1e-6, 1},
+      Range{"max_phase_sigma_rad", c.max_phase_sigma_rad, 1e-6, 1},
       Range{"modulation_ratio_tolerance", c.modulation_ratio_tolerance, 0, 100},
       Range{"reference_tolerance_sigma", c.reference_tolerance_sigma, 0, 1000},
       Range{"reference_tolerance_modulation", c.reference_tolerance_modulation, 0, 100},

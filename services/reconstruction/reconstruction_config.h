@@ -18,10 +18,12 @@ struct ReconstructionConfig {
   double full_scale_16bit_dn = 65535;  // largest grey value of a 16-bit frame (4095 for 12-bit cameras)
 
   // A pixel is masked unless
-  double saturation_fraction = 0.95;         // all its frames are below this part of full scale,
-  double min_modulation_dn = 8;              // its smallest modulation B is above this
-  double min_modulation_sigma = 5;           // and above so many sigma of a grey value,
-  double max_noise_to_modulation = 0.03;     // sigma / B is below this,
+  double saturation_fraction = 0.95;  // all its frames are below this part of full scale,
+  double min_modulation_dn = 8;       // its smallest modulation B is above this
+  double min_modulation_sigma = 5;    // and above so many sigma of a grey value,
+  double max_phase_sigma_rad =
+      0.05;  // the predicted sigma of its noisiest phase is below this: sigma / B of 0.04 for 3-2-2,
+             // 0.07 for 4-4-4 frames; there wrong fringe orders are fewer than 1 in 100,000,
   double modulation_ratio_tolerance = 0.15;  // B of each frequency over B of the first is as expected,
   double reference_tolerance_sigma = 5;      // the reference frame is A + B / contrast within so many sigma
   double reference_tolerance_modulation = 0.05;  // or this part of B, whichever is more,

@@ -27,7 +27,8 @@ void Resize(std::size_t length, RowMatch& match) {
 RowMatcher::RowMatcher(int coordinate_count) : buckets_(static_cast<std::size_t>(coordinate_count) + 2) {}
 
 void RowMatcher::Index(const CoordinateRow& row) {
-  std::fill(buckets_.begin(), buckets_.end(), Range{std::numeric_limits<int>::max(), -1});
+  std::fill(buckets_.begin(), buckets_.end(), -1);
+  entries_.clear();
   const int top = static_cast<int>(buckets_.size()) - 1;
   for (std::size_t u = 0; u + 1 < row.coordinate_px.size(); ++u) {
     if (!IsPair(row, u)) {
@@ -37,9 +38,9 @@ void RowMatcher::Index(const CoordinateRow& row) {
     const int first = std::clamp(static_cast<int>(low + 1), 0, top);  // + 1: the field begins at -0.5
     const int last = std::clamp(static_cast<int>(high + 1), 0, top);
     for (int bucket = first; bucket <= last; ++bucket) {
-      Range& range = buckets_[static_cast<std::size_t>(bucket)];
-      range.first = std::min(range.first, static_cast<int>(u));
-      range.last = static_cast<int>(u);
+      int& head = buckets_[static_cast<std::size_t>(bucket)];
+      entries_.push_back({.pair = static_cast<int>(u), .next = head});
+      head = static_cast<int>(entries_.size()) - 1;
     }
   }
 }
@@ -52,16 +53,16 @@ void RowMatcher::Search(const CoordinateRow& from, const CoordinateRow& into, Ro
     if (std::isnan(wanted)) {
       continue;
     }
-    const Range range = buckets_[static_cast<std::size_t>(std::clamp(static_cast<int>(wanted + 1), 0, top))];
     int found = 0;
-    for (int v = range.first; v <= range.last; ++v) {
-      const auto at = static_cast<std::size_t>(v);
+    int entry = buckets_[static_cast<std::size_t>(std::clamp(static_cast<int>(wanted + 1), 0, top))];
+    for (; entry >= 0 && found < 2; entry = entries_[static_cast<std::size_t>(entry)].next) {
+      const auto at = static_cast<std::size_t>(entries_[static_cast<std::size_t>(entry)].pair);
       const float begin = into.coordinate_px[at];
       const float step = into.coordinate_px[at + 1] - begin;
       const float part = (wanted - begin) / step;
-      if (part >= 0 && part < 1 && IsPair(into, at)) {
+      if (part >= 0 && part < 1) {
         ++found;
-        match.partner_px[u] = static_cast<float>(v) + part;
+        match.partner_px[u] = static_cast<float>(at) + part;
         match.partner_slope[u] = step;
       }
     }

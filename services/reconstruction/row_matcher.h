@@ -34,14 +34,16 @@ class RowMatcher {
   const RowMatch& Match(const CoordinateRow& left, const CoordinateRow& right, float max_left_right_px);
 
  private:
-  struct Range {
-    int first;
-    int last;
+  struct Entry {
+    int pair;  // pixels pair and pair + 1
+    int next;  // entry of the same bucket; -1: none
   };
   void Index(const CoordinateRow& row);
   void Search(const CoordinateRow& from, const CoordinateRow& into, RowMatch& match);
 
-  std::vector<Range> buckets_;  // by whole projector px: the right neighbours' pairs that touch it
+  std::vector<int>
+      buckets_;  // by whole projector px: first entry of a list of the pairs that touch it; -1: none
+  std::vector<Entry> entries_;
   RowMatch forward_;
   RowMatch backward_;
 };

@@ -39,6 +39,7 @@ StripDecoder::StripDecoder(const PatternSet& pattern, const ReconstructionConfig
     const auto at = static_cast<std::size_t>(j);
     period_px_[at] = static_cast<float>(pattern.frequencies[at].period_px);
     fusion_[at] = static_cast<float>(estimator.fusion[at]);
+    phase_noise_[at] = static_cast<float>(estimator.PhaseNoise(j));
     auto& weights = weights_.emplace_back();
     const double px_per_rad =
         estimator.fusion[at] * pattern.frequencies[at].period_px / (2 * std::numbers::pi);
@@ -193,20 +194,22 @@ void StripDecoder::Classify() {
   constexpr double kFullScaleDn = 255;
   const auto saturation_dn = static_cast<float>(config_.saturation_fraction * kFullScaleDn);
   const auto min_dn = static_cast<float>(config_.min_modulation_dn);
-  const auto max_noise = static_cast<float>(config_.max_noise_to_modulation);
-  const auto max_noise_low = static_cast<float>(1 / std::max(config_.min_modulation_sigma, 1e-9));
+  const auto max_phase_sigma = static_cast<float>(config_.max_phase_sigma_rad);
+  const auto min_sigmas = static_cast<float>(config_.min_modulation_sigma);
   const auto read_variance = static_cast<float>(config_.noise.read_noise_dn * config_.noise.read_noise_dn);
   const auto gain = static_cast<float>(config_.noise.gain_dn);
   for (std::size_t x = 0; x < static_cast<std::size_t>(length_); ++x) {
     float least = modulation_[0][x];
     float level = background_[0][x];
+    float worst = phase_noise_[0] / modulation_[0][x];
     for (std::size_t j = 1; j < weights_.size(); ++j) {
       least = std::min(least, modulation_[j][x]);
       level = std::max(level, background_[j][x]);
+      worst = std::max(worst, phase_noise_[j] / modulation_[j][x]);
     }
     modulation_dn[x] = least;
     grey_sigma_[x] = std::sqrt(read_variance + gain * std::max(level, 0.0f));
-    noise_to_modulation[x] = grey_sigma_[x] / least;
+    phase_sigma_rad[x] = grey_sigma_[x] * worst;
     cause[x] = static_cast<std::int32_t>(MaskCause::kValid);
   }
   const auto max_disagreement = static_cast<float>(config_.max_pixel_disagreement_rad);
@@ -222,8 +225,8 @@ void StripDecoder::Classify() {
   ClassifyRatios();
   for (int x = 0; x < length_; ++x) {
     const auto at = static_cast<std::size_t>(x);
-    Mark(x, noise_to_modulation[at] > max_noise, static_cast<int>(MaskCause::kNoisy));
-    Mark(x, modulation_dn[at] < min_dn || noise_to_modulation[at] > max_noise_low,
+    Mark(x, phase_sigma_rad[at] > max_phase_sigma, static_cast<int>(MaskCause::kNoisy));
+    Mark(x, modulation_dn[at] < min_dn || modulation_dn[at] < min_sigmas * grey_sigma_[at],
          static_cast<int>(MaskCause::kLowModulation));
     Mark(x, peak_[at] >= saturation_dn, static_cast<int>(MaskCause::kSaturated));
   }

@@ -31,8 +31,8 @@ class StripDecoder {
 
   Lane coordinate_px;
   Lane sigma_px;
-  Lane modulation_dn;        // least of the frequencies
-  Lane noise_to_modulation;  // worst of the frequencies
+  Lane modulation_dn;    // least of the frequencies
+  Lane phase_sigma_rad;  // predicted; worst of the frequencies, average over the phase
   Lane disagreement_rad;
   std::array<std::int32_t, kLength> cause;
 
@@ -65,6 +65,7 @@ class StripDecoder {
   std::vector<std::vector<FrameTerm>> terms_;   // by frame
   std::array<float, kMaxFrequencies> period_px_{};
   std::array<float, kMaxFrequencies> fusion_{};
+  std::array<float, kMaxFrequencies> phase_noise_{};  // phase sigma over sigma / B
   int length_ = 0;
 
   std::vector<Lane> frames_;  // grey values, 8-bit DN

@@ -1,5 +1,8 @@
 // forgescan reconstruct: image files of one view -> cloud.ply and, on request, what is known about its
 // quality.
+#include <unistd.h>
+
+#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <memory>
@@ -25,20 +28,51 @@ struct ReconstructArguments {
   ReconstructionConfig config;
 };
 
+// Image codecs write their complaints on stderr themselves. While this lives they land here instead, so that
+// the user gets one sentence, and a complaint about a picture that was decoded all the same (a cut off JPEG)
+// is not lost.
+class CodecComplaints {
+ public:
+  CodecComplaints() : file_(std::tmpfile()), stderr_(dup(STDERR_FILENO)) {
+    if (file_ != nullptr) {
+      dup2(fileno(file_), STDERR_FILENO);
+    }
+  }
+  CodecComplaints(const CodecComplaints&) = delete;
+  CodecComplaints& operator=(const CodecComplaints&) = delete;
+  ~CodecComplaints() {
+    dup2(stderr_, STDERR_FILENO);
+    close(stderr_);
+    if (file_ != nullptr) {
+      std::fclose(file_);
+    }
+  }
+  bool any() const { return file_ != nullptr && lseek(fileno(file_), 0, SEEK_END) > 0; }
+
+ private:
+  std::FILE* file_;
+  int stderr_;
+};
+
+Result<cv::Mat> ReadFrame(const std::filesystem::path& path) {
+  if (!std::filesystem::is_regular_file(path)) {
+    return Fail(ErrorCode::kNotFound, "{}: there is no such frame", path.string());
+  }
+  const CodecComplaints complaints;
+  cv::Mat frame = cv::imread(path.string(), cv::IMREAD_UNCHANGED);
+  if (frame.empty() || complaints.any()) {
+    return Fail(ErrorCode::kFormat, "{}: is not a readable image, or is cut off", path.string());
+  }
+  if (frame.type() != CV_8UC1 && frame.type() != CV_16UC1) {
+    return Fail(ErrorCode::kFormat, "{}: is not a grey image of 8 or 16 bit", path.string());
+  }
+  return frame;
+}
+
 Result<std::vector<cv::Mat>> ReadFrames(const std::filesystem::path& directory, const PatternSet& pattern) {
   std::vector<cv::Mat> frames;
   for (const std::string& name : pattern.frame_names) {
-    const std::filesystem::path path = directory / name;
-    if (!std::filesystem::is_regular_file(path)) {
-      return Fail(ErrorCode::kNotFound, "{}: there is no such frame", path.string());
-    }
-    cv::Mat frame = cv::imread(path.string(), cv::IMREAD_UNCHANGED);
-    if (frame.empty()) {
-      return Fail(ErrorCode::kFormat, "{}: is not a readable image", path.string());
-    }
-    if (frame.type() != CV_8UC1 && frame.type() != CV_16UC1) {
-      return Fail(ErrorCode::kFormat, "{}: is not a grey image of 8 or 16 bit", path.string());
-    }
+    ASSIGN_OR_RETURN(auto frame, ReadFrame(directory / name));
     frames.push_back(std::move(frame));
   }
   return frames;
@@ -56,7 +90,7 @@ nlohmann::json ToJson(const CameraQuality& quality) {
   return {{"pixels", pixels},
           {"repaired", quality.repaired},
           {"median_modulation_dn", quality.median_modulation_dn},
-          {"median_noise_to_modulation", quality.median_noise_to_modulation},
+          {"median_sigma_px", quality.median_sigma_px},
           {"measured_noise_dn", number(quality.trust.noise_dn)},
           {"disagreement_rad", quality.trust.disagreement_rad},
           {"predicted_disagreement_rad", quality.trust.predicted_disagreement_rad},
