@@ -135,21 +135,22 @@ void KeepNearest(std::vector<Pair>& pairs, double threshold_mm, double keep_shar
   }
 }
 
-std::size_t WeighBiweight(std::vector<Pair>& pairs, double threshold_mm) {
+WeighedPairs WeighBiweight(std::vector<Pair>& pairs, double threshold_mm, double least_cut_mm) {
   std::vector<float> residuals;
   for (Pair& pair : pairs) {
     if (pair.distance_mm > threshold_mm) pair.weight = 0;
     if (pair.weight > 0) residuals.push_back(std::abs(Residual(pair)));
   }
   const std::size_t within = residuals.size();
-  const double cut = kBiweight * std::max(kMadToSigma * MedianOf(residuals), kSmallestScaleMm);
+  const double scale_mm = std::max(kMadToSigma * MedianOf(residuals), kSmallestScaleMm);
+  const double cut_mm = std::max(kBiweight * scale_mm, least_cut_mm);
   for (Pair& pair : pairs) {
     if (!(pair.weight > 0)) continue;
-    const double ratio = Residual(pair) / cut;
+    const double ratio = Residual(pair) / cut_mm;
     const double inside = std::max(0.0, 1 - ratio * ratio);
     pair.weight = static_cast<float>(inside * inside);
   }
-  return within;
+  return {within, cut_mm};
 }
 
 }  // namespace forgescan

@@ -42,8 +42,13 @@ double AdaptiveThreshold(const std::vector<Pair>& pairs, double gate_mm, double 
 // left.
 void KeepNearest(std::vector<Pair>& pairs, double threshold_mm, double keep_share);
 
+struct WeighedPairs {
+  std::size_t within;  // pairs within the threshold
+  double cut_mm;       // residual at which the weight becomes 0
+};
+
 // Weight 0 for pairs beyond threshold_mm, Tukey's biweight of the point-to-plane residual for the rest, with
-// the scale from their median. Returns how many pairs lie within the threshold.
-std::size_t WeighBiweight(std::vector<Pair>& pairs, double threshold_mm);
+// the scale from their median, but no narrower than least_cut_mm.
+WeighedPairs WeighBiweight(std::vector<Pair>& pairs, double threshold_mm, double least_cut_mm);
 
 }  // namespace forgescan

@@ -13,6 +13,8 @@ constexpr double kCoarseStopShare = 0.05;  // of the sample spacing: what pairin
 // stage stops only at a fraction of the eigenvalue that the result must have.
 constexpr double kCoarseDamping = 1e-3;
 constexpr double kPassingShare = 0.1;
+constexpr double kSettledShare = 0.1;  // a motion below this share of the biweight's width lets it narrow,
+constexpr double kNarrowing = 0.6;     // to this share of itself
 
 struct Progress {
   Eigen::Isometry3d model_from_scan;
@@ -69,21 +71,26 @@ struct FineResult {
   bool converged;
 };
 
-// The same against the exact surface, until the far end of the part rests.
+// The same against the exact surface, until the far end of the part rests. The biweight starts as wide as the
+// coarse stage can have left the pose off, and narrows to the noise as the pose settles: at the noise alone,
+// the few faces across the part would count as outliers and the part would never slide home along itself.
 Result<FineResult> AlignFine(const ScanSample& sample, const RegistrationModel& model,
                              const IcpOptions& options, Progress progress) {
   double gate_mm = 2 * std::max(options.threshold_floor_mm, model.spacing_mm());
+  double least_cut_mm = gate_mm;
   int still = 0;
   for (int i = 0; i < options.max_iterations && still < kStillSteps; ++i) {
     std::vector<Pair> pairs = PairWithSurface(sample, model, progress.model_from_scan, gate_mm, options);
     gate_mm = AdaptiveThreshold(pairs, gate_mm, options.threshold_floor_mm, options.threshold_sigmas);
-    WeighBiweight(pairs, gate_mm);
+    const WeighedPairs weighed = WeighBiweight(pairs, gate_mm, least_cut_mm);
     ASSIGN_OR_RETURN(const PoseStep step,
                      SolveStep(pairs, FrameOf(model), {kPassingShare * options.min_eigenvalue}));
     progress.model_from_scan = step.moved_from_before * progress.model_from_scan;
     ++progress.iterations;
-    const bool rests = step.rotation_mm < options.stop_mm && step.translation_mm < options.stop_mm;
-    still = rests ? still + 1 : 0;
+    const double motion_mm = std::max(step.rotation_mm, step.translation_mm);
+    const bool narrow = weighed.cut_mm > least_cut_mm;
+    still = narrow && motion_mm < options.stop_mm ? still + 1 : 0;
+    if (motion_mm < kSettledShare * least_cut_mm) least_cut_mm *= kNarrowing;
   }
   return FineResult{progress, gate_mm, still >= kStillSteps};
 }
@@ -102,7 +109,7 @@ Result<Registration> Describe(const ScanSample& sample, const RegistrationModel&
   result.iterations = fine.progress.iterations;
   result.threshold_mm = std::min(fine.threshold_mm, options.score_cap_mm);
   result.considered = pairs.size();
-  result.inliers = WeighBiweight(pairs, result.threshold_mm);
+  result.inliers = WeighBiweight(pairs, result.threshold_mm, 0).within;
   result.inlier_share = static_cast<double>(result.inliers) / static_cast<double>(pairs.size());
   result.capped_score_mm = score / static_cast<double>(pairs.size());
   ASSIGN_OR_RETURN(const PoseStep step, SolveStep(pairs, FrameOf(model), {options.min_eigenvalue}));

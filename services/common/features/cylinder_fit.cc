@@ -202,6 +202,7 @@ Result<CylinderFit> FitCylinder(std::span<const Eigen::Vector3d> points,
     return GaussNewton(used, before != nullptr ? *before : first);
   };
   ASSIGN_OR_RETURN(CylinderFit cylinder, FitRobust<CylinderFit>(points, options, fit));
+  RETURN_IF_ERROR(CheckRoundness(cylinder.quality, cylinder.radius_mm, "cylinder"));
   std::vector<double> residuals;
   for (const Eigen::Vector3d& p : points) residuals.push_back(std::abs(cylinder.Residual(p)));
   cylinder.arc_deg = ArcDeg(points, cylinder, RejectionLimit(residuals, options.reject_sigmas));

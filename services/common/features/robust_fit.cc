@@ -8,6 +8,8 @@ namespace {
 constexpr double kMadToSigma = 1.4826;  // for normal residuals
 constexpr double kRoundingMm = 1e-6;    // keeps exact data from losing points to the last digit
 
+constexpr double kLargestSigmaShare = 0.1;  // of the radius
+
 }  // namespace
 
 double RejectionLimit(std::vector<double>& absolute_residuals, double reject_sigmas) {
@@ -26,6 +28,13 @@ Status CheckPoints(std::span<const Eigen::Vector3d> points, std::size_t needed, 
     if (!points[i].allFinite()) return Fail(ErrorCode::kInvalidArgument, "point {} is not finite", i);
   }
   return {};
+}
+
+Status CheckRoundness(const FitQuality& quality, double radius_mm, const char* feature) {
+  if (quality.sigma_mm <= kLargestSigmaShare * radius_mm) return {};
+  return Fail(ErrorCode::kUntrusted,
+              "the points scatter by {:.3g} mm about a {} of radius {:.3g} mm: another shape",
+              quality.sigma_mm, feature, radius_mm);
 }
 
 }  // namespace forgescan

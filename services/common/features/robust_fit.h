@@ -34,10 +34,14 @@ double RejectionLimit(std::vector<double>& absolute_residuals, double reject_sig
 // Errors: kInvalidArgument for a point that is not finite, or fewer points than `needed`.
 Status CheckPoints(std::span<const Eigen::Vector3d> points, std::size_t needed, const char* feature);
 
-// Source: DOMAIN rule "drop > k sigma, refit until none is left": every round judges all points anew, so that
-// a point dropped early can come back. Fit: (points used, shape before or nullptr) -> Result<Shape>; Shape:
-// double Residual(point) const and FitQuality quality; kUnknowns. Errors: those of the fit; kUntrusted if
-// too many points were rejected.
+// Errors: kUntrusted if the residuals are no longer small against the radius: the points are of another
+// shape.
+Status CheckRoundness(const FitQuality& quality, double radius_mm, const char* feature);
+
+// Purpose: drop what lies beyond k sigma and refit, until none is left or max_rounds: every round judges all
+// points anew, so that a point dropped early can come back. Fit: (points used, shape before or nullptr) ->
+// Result<Shape>; Shape: double Residual(point) const and FitQuality quality; kUnknowns. Errors: those of the
+// fit; kUntrusted if too many points were rejected.
 template <typename Shape, typename Fit>
 Result<Shape> FitRobust(std::span<const Eigen::Vector3d> points, const RobustOptions& options,
                         const Fit& fit) {

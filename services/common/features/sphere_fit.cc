@@ -73,6 +73,7 @@ Result<SphereFit> FitSphere(std::span<const Eigen::Vector3d> points, const Robus
     return GaussNewton(used, start);
   };
   ASSIGN_OR_RETURN(SphereFit sphere, FitRobust<SphereFit>(points, options, fit));
+  RETURN_IF_ERROR(CheckRoundness(sphere.quality, sphere.radius_mm, "sphere"));
   sphere.covariance *= sphere.quality.sigma_mm * sphere.quality.sigma_mm;
   return sphere;
 }
