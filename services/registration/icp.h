@@ -26,7 +26,7 @@ namespace forgescan {
 struct IcpOptions {
   double start_translation_mm = 10;   // how far the start may be off, at the model's centre
   double start_rotation_rad = 0.053;  // 3 degrees
-  double threshold_sigmas = 2;        // a of Eq. (6); below 1.5, one start in 20 of the test axle failed
+  double threshold_sigmas = 2;        // a of Eq. (6); at 1.5 and below, a start in 20 of the test axle failed
   double keep_share = 0.7;            // step 5
   double threshold_floor_mm = 1;      // Eq. (6) goes no lower: noise and the deviations a good part may have
   double normal_limit_rad = 0.7;      // between scan and model normal; used where the scan has normals
