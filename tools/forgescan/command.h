@@ -9,5 +9,8 @@
 namespace forgescan {
 
 void AddReconstructCommand(CLI::App& app, Status& outcome);
+void AddRegisterCommand(CLI::App& app, Status& outcome);
+void AddFitCommand(CLI::App& app, Status& outcome);
+void AddModelCommand(CLI::App& app, Status& outcome);
 
 }  // namespace forgescan

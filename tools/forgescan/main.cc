@@ -9,6 +9,9 @@ int main(int argc, char** argv) {
   forgescan::Status outcome;
   try {
     forgescan::AddReconstructCommand(app, outcome);
+    forgescan::AddRegisterCommand(app, outcome);
+    forgescan::AddFitCommand(app, outcome);
+    forgescan::AddModelCommand(app, outcome);
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error);

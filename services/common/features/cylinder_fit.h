@@ -1,0 +1,44 @@
+// Least-squares cylinder.
+#pragma once
+
+#include <optional>
+
+#include "services/common/features/robust_fit.h"
+
+namespace forgescan {
+
+// Units: mm. Frames: that of the points.
+struct CylinderFit {
+  static constexpr double kUnknowns = 5;
+  Eigen::Vector3d axis_point =
+      Eigen::Vector3d::Zero();                     // on the axis, beside the centroid of the points used
+  Eigen::Vector3d axis = Eigen::Vector3d::Zero();  // unit; sign: the largest component is positive
+  double radius_mm = 0;
+  double arc_deg = 0;               // 360 less the largest gap between the points used, seen along the axis
+  bool radius_constrained = false;  // the radius was given, not fitted
+  // Of (axis_point along two directions across the axis, tilt towards them in rad, radius), as if the points
+  // were independent. A constrained radius has variance 0.
+  Eigen::Matrix<double, 5, 5> covariance = Eigen::Matrix<double, 5, 5>::Zero();
+  FitQuality quality;
+
+  double Residual(const Eigen::Vector3d& p) const {
+    const Eigen::Vector3d q = p - axis_point;
+    return (q - q.dot(axis) * axis).norm() - radius_mm;
+  }
+  double RadiusUncertaintyMm() const { return std::sqrt(covariance(4, 4)); }
+};
+
+struct CylinderStart {
+  Eigen::Vector3d axis_point;
+  Eigen::Vector3d axis;
+  double radius_mm;
+  bool keep_radius = false;  // fit position and direction only
+};
+
+// Gauss-Newton over the five parameters. Without a start, directions all over the half sphere are tried on a
+// sample of the points, each with an algebraic circle. Errors: kInvalidArgument (fewer than 5 points, not
+// finite, start not usable); kDegenerate if the points do not fix the axis or the radius; kNotConverged.
+Result<CylinderFit> FitCylinder(std::span<const Eigen::Vector3d> points,
+                                const std::optional<CylinderStart>& start, const RobustOptions& options);
+
+}  // namespace forgescan

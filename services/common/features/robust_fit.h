@@ -1,0 +1,66 @@
+// Least squares with rejection of outliers, the same for every kind of feature.
+#pragma once
+
+#include <Eigen/Core>
+#include <cmath>
+#include <span>
+#include <vector>
+
+#include "services/common/result.h"
+
+namespace forgescan {
+
+struct RobustOptions {
+  double reject_sigmas = 3;  // k; sigma is 1.4826 times the median of the absolute residuals
+  int max_rounds = 10;
+};
+
+// How a feature came out of its points. Shape: points = used + rejected.
+struct FitQuality {
+  std::size_t points = 0;
+  std::size_t rejected = 0;
+  double sigma_mm = 0;  // standard deviation of the residuals of the points used
+
+  std::size_t used() const { return points - rejected; }
+  double rejected_share() const {
+    return points > 0 ? static_cast<double>(rejected) / static_cast<double>(points) : 0;
+  }
+};
+
+// k * 1.4826 * median |residual|, at least the rounding of single-precision points. Moves the values about.
+double RejectionLimit(std::vector<double>& absolute_residuals, double reject_sigmas);
+
+// Errors: kInvalidArgument for a point that is not finite, or fewer points than `needed`.
+Status CheckPoints(std::span<const Eigen::Vector3d> points, std::size_t needed, const char* feature);
+
+// Source: DOMAIN rule "drop > k sigma, refit until none is left": every round judges all points anew, so that
+// a point dropped early can come back. Fit: (points used, shape before or nullptr) -> Result<Shape>; Shape:
+// double Residual(point) const and FitQuality quality; kUnknowns. Errors: those of the fit.
+template <typename Shape, typename Fit>
+Result<Shape> FitRobust(std::span<const Eigen::Vector3d> points, const RobustOptions& options,
+                        const Fit& fit) {
+  std::vector<Eigen::Vector3d> used(points.begin(), points.end());
+  ASSIGN_OR_RETURN(Shape shape, fit(used, static_cast<const Shape*>(nullptr)));
+  std::vector<double> residuals(points.size()), sorted;
+  for (int round = 0; round < options.max_rounds; ++round) {
+    for (std::size_t i = 0; i < points.size(); ++i) residuals[i] = std::abs(shape.Residual(points[i]));
+    sorted = residuals;
+    const double limit = RejectionLimit(sorted, options.reject_sigmas);
+    std::vector<Eigen::Vector3d> next;
+    next.reserve(points.size());
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      if (residuals[i] <= limit) next.push_back(points[i]);
+    }
+    const bool unchanged = next.size() == used.size() && round > 0;
+    used.swap(next);
+    if (unchanged) break;
+    ASSIGN_OR_RETURN(shape, fit(used, &shape));
+  }
+  double squares = 0;
+  for (const Eigen::Vector3d& p : used) squares += shape.Residual(p) * shape.Residual(p);
+  const double freedom = std::max(1.0, static_cast<double>(used.size()) - Shape::kUnknowns);
+  shape.quality = {points.size(), points.size() - used.size(), std::sqrt(squares / freedom)};
+  return shape;
+}
+
+}  // namespace forgescan

@@ -1,0 +1,97 @@
+#include "services/common/geometry/cloud_io.h"
+
+#include <array>
+#include <bit>
+#include <fstream>
+#include <sstream>
+#include <string>
+#include <system_error>
+#include <utility>
+
+namespace forgescan {
+namespace {
+
+Result<std::string> ReadFile(const std::filesystem::path& path) {
+  std::error_code failure;
+  if (!std::filesystem::is_regular_file(path, failure)) {
+    return Fail(ErrorCode::kNotFound, "{}: there is no such file", path.string());
+  }
+  std::ifstream file(path, std::ios::binary);
+  std::ostringstream bytes;
+  bytes << file.rdbuf();
+  if (!file || !bytes) {
+    return Fail(ErrorCode::kIo, "{}: cannot be read, or is empty", path.string());
+  }
+  return std::move(bytes).str();
+}
+
+template <typename T>
+void Append(std::string& bytes, const T& value) {
+  static_assert(std::endian::native == std::endian::little);
+  bytes.append(reinterpret_cast<const char*>(&value), sizeof(T));
+}
+
+std::string EncodePly(const PointCloud& cloud) {
+  std::string bytes = "ply\nformat binary_little_endian 1.0\ncomment units: mm\n";
+  bytes +=
+      fmt::format("element vertex {}\nproperty float x\nproperty float y\nproperty float z\n", cloud.size());
+  bytes += cloud.normals.empty() ? "" : "property float nx\nproperty float ny\nproperty float nz\n";
+  bytes += cloud.sigma_mm.empty() ? "" : "property float sigma_mm\n";
+  bytes += cloud.view.empty() ? "" : "property ushort view\n";
+  bytes += "end_header\n";
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    Append(bytes, std::array<float, 3>{cloud.points[i].x(), cloud.points[i].y(), cloud.points[i].z()});
+    if (!cloud.normals.empty()) {
+      Append(bytes, std::array<float, 3>{cloud.normals[i].x(), cloud.normals[i].y(), cloud.normals[i].z()});
+    }
+    if (!cloud.sigma_mm.empty()) {
+      Append(bytes, cloud.sigma_mm[i]);
+    }
+    if (!cloud.view.empty()) {
+      Append(bytes, cloud.view[i]);
+    }
+  }
+  return bytes;
+}
+
+}  // namespace
+
+Result<PointCloud> ReadPointCloud(const std::filesystem::path& path) {
+  ASSIGN_OR_RETURN(const std::string bytes, ReadFile(path));
+  return ParsePointCloud(bytes, path.string());
+}
+
+Result<TriangleMesh> ReadTriangleMesh(const std::filesystem::path& path) {
+  ASSIGN_OR_RETURN(const std::string bytes, ReadFile(path));
+  return ParseTriangleMesh(bytes, path.string());
+}
+
+Status WritePly(const std::filesystem::path& path, const PointCloud& cloud) {
+  const auto fits = [&cloud](std::size_t n) { return n == 0 || n == cloud.size(); };
+  if (!fits(cloud.normals.size()) || !fits(cloud.sigma_mm.size()) || !fits(cloud.view.size())) {
+    return Fail(ErrorCode::kInvalidArgument,
+                "{}: the cloud has {} points but {} normals, {} sigmas and {} views", path.string(),
+                cloud.size(), cloud.normals.size(), cloud.sigma_mm.size(), cloud.view.size());
+  }
+  const std::filesystem::path part = path.string() + ".part";
+  std::error_code failure;
+  {
+    const std::string bytes = EncodePly(cloud);
+    std::ofstream file(part, std::ios::binary | std::ios::trunc);
+    file.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+    file.close();
+    if (!file) {
+      std::filesystem::remove(part, failure);
+      return Fail(ErrorCode::kIo, "{}: cannot be written", path.string());
+    }
+  }
+  std::filesystem::rename(part, path, failure);
+  if (failure) {
+    const std::string reason = failure.message();
+    std::filesystem::remove(part, failure);
+    return Fail(ErrorCode::kIo, "{}: cannot be put in place ({})", path.string(), reason);
+  }
+  return {};
+}
+
+}  // namespace forgescan

@@ -1,0 +1,167 @@
+#include "services/common/geometry/triangle_index.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+namespace forgescan {
+namespace {
+
+constexpr std::size_t kLeafSize = 4;
+// Two triangles that share the nearest edge give distances that differ by rounding only.
+constexpr float kTie = 1e-5F;
+
+// Nearest point to p of the triangle a + s ab + t ac (regions of the plane as in Ericson, Real-Time Collision
+// Detection, 5.1.5).
+Eigen::Vector3f NearestOnTriangle(const Eigen::Vector3f& p, const Eigen::Vector3f& a,
+                                  const Eigen::Vector3f& ab, const Eigen::Vector3f& ac) {
+  const Eigen::Vector3f ap = p - a;
+  const float d1 = ab.dot(ap), d2 = ac.dot(ap);
+  if (d1 <= 0 && d2 <= 0) return a;
+  const Eigen::Vector3f bp = ap - ab;
+  const float d3 = ab.dot(bp), d4 = ac.dot(bp);
+  if (d3 >= 0 && d4 <= d3) return a + ab;
+  const float vc = d1 * d4 - d3 * d2;
+  if (vc <= 0 && d1 >= 0 && d3 <= 0) return a + ab * (d1 / std::max(d1 - d3, 1e-30F));
+  const Eigen::Vector3f cp = ap - ac;
+  const float d5 = ab.dot(cp), d6 = ac.dot(cp);
+  if (d6 >= 0 && d5 <= d6) return a + ac;
+  const float vb = d5 * d2 - d1 * d6;
+  if (vb <= 0 && d2 >= 0 && d6 <= 0) return a + ac * (d2 / std::max(d2 - d6, 1e-30F));
+  const float va = d3 * d6 - d5 * d4;
+  if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) {
+    const float along = (d4 - d3) / std::max((d4 - d3) + (d5 - d6), 1e-30F);
+    return a + ab + (ac - ab) * along;
+  }
+  const float scale = 1.0F / (va + vb + vc);
+  return a + ab * (vb * scale) + ac * (vc * scale);
+}
+
+float SquaredDistanceToBox(const Eigen::Vector3f& p, const Eigen::Vector3f& low,
+                           const Eigen::Vector3f& high) {
+  return (low - p).cwiseMax(p - high).cwiseMax(0.0F).squaredNorm();
+}
+
+}  // namespace
+
+struct TriangleIndex::Best {
+  float squared;  // nothing at or beyond this distance is of interest
+  std::uint32_t slot = kNoTriangle;
+  Eigen::Vector3f foot = Eigen::Vector3f::Zero();
+  float off_plane =
+      -1;  // |component of (point - foot) along the normal|: decides between triangles that share an edge
+};
+
+Result<TriangleIndex> TriangleIndex::Build(const std::vector<Eigen::Vector3f>& vertices,
+                                           const std::vector<TriangleCorners>& triangles) {
+  if (triangles.empty()) {
+    return Fail(ErrorCode::kInvalidArgument, "the mesh has no triangles, at least 1 is needed");
+  }
+  TriangleIndex index;
+  Eigen::AlignedBox3f box;
+  for (std::size_t i = 0; i < vertices.size(); ++i) {
+    if (!vertices[i].allFinite()) return Fail(ErrorCode::kInvalidArgument, "mesh vertex {} is not finite", i);
+    box.extend(vertices[i]);
+  }
+  if (!box.isEmpty()) index.center_ = box.center();
+  std::vector<Eigen::Vector3f> centroids;
+  centroids.reserve(triangles.size());
+  index.corners_.reserve(triangles.size());
+  for (std::size_t i = 0; i < triangles.size(); ++i) {
+    const auto& t = triangles[i];
+    if (std::max({t[0], t[1], t[2]}) >= vertices.size()) {
+      return Fail(ErrorCode::kInvalidArgument, "mesh triangle {} names a vertex beyond the {} there are", i,
+                  vertices.size());
+    }
+    const Eigen::Vector3f a = vertices[t[0]] - index.center_;
+    const Eigen::Vector3f ab = vertices[t[1]] - vertices[t[0]], ac = vertices[t[2]] - vertices[t[0]];
+    const Eigen::Vector3d normal = ab.cast<double>().cross(ac.cast<double>());
+    const Eigen::Vector3d unit = normal.norm() > 0 ? normal.normalized().eval() : normal;
+    index.corners_.push_back({a, ab, ac, unit.cast<float>(), static_cast<std::uint32_t>(i)});
+    centroids.emplace_back(a + (ab + ac) / 3.0F);
+  }
+  index.nodes_.reserve(triangles.size());
+  index.BuildNode(0, triangles.size(), centroids);
+  index.slot_of_.resize(triangles.size());
+  for (std::uint32_t slot = 0; slot < index.corners_.size(); ++slot) {
+    index.slot_of_[index.corners_[slot].triangle] = slot;
+  }
+  return index;
+}
+
+// Splits at the median centroid of the longest axis: depth stays below 2 + log2(n), so recursion is bounded.
+void TriangleIndex::BuildNode(std::size_t begin, std::size_t end, std::vector<Eigen::Vector3f>& centroids) {
+  Eigen::AlignedBox3f box, spread;
+  for (std::size_t i = begin; i < end; ++i) {
+    const Corners& c = corners_[i];
+    box.extend(c.a).extend(c.a + c.ab).extend(c.a + c.ac);
+    spread.extend(centroids[c.triangle]);
+  }
+  const std::size_t self = nodes_.size();
+  nodes_.push_back(
+      {box.min(), static_cast<std::uint32_t>(begin), box.max(), static_cast<std::uint32_t>(end - begin)});
+  if (end - begin <= kLeafSize) return;
+  Eigen::Index axis = 0;
+  spread.sizes().maxCoeff(&axis);
+  const std::size_t middle = begin + (end - begin) / 2;
+  const auto at = [&](std::size_t i) { return corners_.begin() + static_cast<std::ptrdiff_t>(i); };
+  std::nth_element(at(begin), at(middle), at(end), [&](const Corners& x, const Corners& y) {
+    const float cx = centroids[x.triangle][axis], cy = centroids[y.triangle][axis];
+    return cx < cy || (cx == cy && x.triangle < y.triangle);
+  });
+  BuildNode(begin, middle, centroids);
+  nodes_[self].first = static_cast<std::uint32_t>(nodes_.size());
+  nodes_[self].count = 0;
+  BuildNode(middle, end, centroids);
+}
+
+void TriangleIndex::VisitLeaf(const Node& leaf, const Eigen::Vector3f& point, Best& best) const {
+  for (std::uint32_t slot = leaf.first; slot < leaf.first + leaf.count; ++slot) {
+    const Corners& c = corners_[slot];
+    const Eigen::Vector3f foot = NearestOnTriangle(point, c.a, c.ab, c.ac);
+    const float squared = (point - foot).squaredNorm();
+    if (!(squared <= best.squared * (1 + kTie))) continue;  // also when a sliver gave NaN
+    const float off_plane = std::abs(c.normal.dot(point - foot));
+    const bool tie = best.slot != kNoTriangle && squared > best.squared * (1 - kTie);
+    if (tie && off_plane <= best.off_plane) continue;
+    best = {std::min(squared, best.squared), slot, foot, off_plane};
+  }
+}
+
+std::optional<TriangleIndex::Nearest> TriangleIndex::Find(const Eigen::Vector3f& point, float max_distance_mm,
+                                                          std::uint32_t hint) const {
+  const Eigen::Vector3f p = point - center_;
+  if (!p.allFinite() || !(max_distance_mm >= 0)) return std::nullopt;
+  Best best{max_distance_mm * max_distance_mm};
+  if (hint < slot_of_.size()) {
+    const Corners& c = corners_[slot_of_[hint]];
+    const float bound = (p - NearestOnTriangle(p, c.a, c.ab, c.ac)).squaredNorm();
+    best.squared = std::min(best.squared, bound * (1 + kTie));
+  }
+  struct Entry {
+    std::uint32_t node;
+    float squared;
+  };
+  std::array<Entry, 64> stack;  // a median tree over at most 2^32 triangles is less than 40 deep
+  std::size_t depth = 0;
+  stack[depth++] = {0, SquaredDistanceToBox(p, nodes_[0].low, nodes_[0].high)};
+  while (depth > 0) {
+    const Entry entry = stack[--depth];
+    if (entry.squared > best.squared * (1 + kTie)) continue;
+    const Node& node = nodes_[entry.node];
+    if (node.count > 0) {
+      VisitLeaf(node, p, best);
+      continue;
+    }
+    Entry near{entry.node + 1,
+               SquaredDistanceToBox(p, nodes_[entry.node + 1].low, nodes_[entry.node + 1].high)};
+    Entry far{node.first, SquaredDistanceToBox(p, nodes_[node.first].low, nodes_[node.first].high)};
+    if (far.squared < near.squared) std::swap(near, far);
+    stack[depth++] = far;
+    stack[depth++] = near;
+  }
+  if (best.slot == kNoTriangle) return std::nullopt;
+  return Nearest{corners_[best.slot].triangle, (p - best.foot).norm(), best.foot + center_};
+}
+
+}  // namespace forgescan

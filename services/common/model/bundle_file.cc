@@ -1,0 +1,214 @@
+#include "services/common/model/bundle_file.h"
+
+#include <libdeflate.h>
+
+#include <cstring>
+#include <fstream>
+#include <system_error>
+#include <type_traits>
+
+namespace forgescan {
+namespace {
+
+constexpr char kMagic[] = "FSBUNDLE";
+constexpr std::size_t kMagicSize = 8;
+constexpr std::size_t kHeaderSize = kMagicSize + 4 + 4 + 8;
+constexpr std::uint32_t kVersion = 1;
+constexpr std::uintmax_t kMaxFileBytes = std::uintmax_t{4} << 30;
+
+template <typename T>
+void Put(std::string& bytes, const T& value) {
+  static_assert(std::is_trivially_copyable_v<T>);
+  bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
+}
+
+void PutVector(std::string& bytes, const Eigen::Vector3d& v) {
+  bytes.append(reinterpret_cast<const char*>(v.data()), 3 * sizeof(double));
+}
+
+template <typename T>
+void PutArray(std::string& bytes, const std::vector<T>& values) {
+  Put(bytes, static_cast<std::uint64_t>(values.size()));
+  bytes.append(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T));
+}
+
+// Reads forward through the payload; after the first read past the end, ok() stays false and values stay
+// zero.
+class Cursor {
+ public:
+  explicit Cursor(const std::string& bytes, std::size_t at) : bytes_(bytes), at_(at) {}
+  bool ok() const { return ok_; }
+  bool AtEnd() const { return ok_ && at_ == bytes_.size(); }
+
+  template <typename T>
+  T Take() {
+    T value{};
+    Copy(&value, sizeof value);
+    return value;
+  }
+  Eigen::Vector3d TakeVector() {
+    Eigen::Vector3d v = Eigen::Vector3d::Zero();
+    Copy(v.data(), 3 * sizeof(double));
+    return v;
+  }
+  template <typename T>
+  std::vector<T> TakeArray() {
+    const auto count = Take<std::uint64_t>();
+    if (!ok_ || count > (bytes_.size() - at_) / sizeof(T)) {
+      ok_ = false;
+      return {};
+    }
+    std::vector<T> values(count);
+    Copy(values.data(), count * sizeof(T));
+    return values;
+  }
+  std::string TakeString() {
+    const auto characters = TakeArray<char>();
+    return {characters.begin(), characters.end()};
+  }
+
+ private:
+  void Copy(void* target, std::size_t size) {
+    ok_ = ok_ && size <= bytes_.size() - at_;
+    if (!ok_ || size == 0) return;
+    std::memcpy(target, bytes_.data() + at_, size);
+    at_ += size;
+  }
+
+  const std::string& bytes_;
+  std::size_t at_;
+  bool ok_ = true;
+};
+
+std::string EncodePayload(const ModelBundle& bundle) {
+  std::string bytes;
+  Put(bytes, bundle.spacing_mm);
+  Put(bytes, bundle.resolution_mm);
+  Put(bytes, bundle.chord_error_mm);
+  Put(bytes, static_cast<std::uint64_t>(bundle.faces.size()));
+  for (const ModelFace& face : bundle.faces) {
+    PutArray(bytes, std::vector<char>(face.name.begin(), face.name.end()));
+    Put(bytes, static_cast<std::uint32_t>(face.type));
+    PutVector(bytes, face.point);
+    PutVector(bytes, face.direction);
+    Put(bytes, face.radius_mm);
+    Put(bytes, face.first_triangle);
+    Put(bytes, face.triangle_count);
+  }
+  PutArray(bytes, bundle.vertices);
+  PutArray(bytes, bundle.triangles);
+  PutArray(bytes, bundle.sample_points);
+  PutArray(bytes, bundle.sample_normals);
+  return bytes;
+}
+
+Result<ModelFace> TakeFace(Cursor& cursor) {
+  ModelFace face;
+  face.name = cursor.TakeString();
+  const auto type = cursor.Take<std::uint32_t>();
+  if (type > kLastFaceType)
+    return Fail(ErrorCode::kFormat, "the model bundle has a face of unknown type {}", type);
+  face.type = static_cast<FaceType>(type);
+  face.point = cursor.TakeVector();
+  face.direction = cursor.TakeVector();
+  face.radius_mm = cursor.Take<double>();
+  face.first_triangle = cursor.Take<std::uint32_t>();
+  face.triangle_count = cursor.Take<std::uint32_t>();
+  return face;
+}
+
+Result<ModelBundle> DecodePayload(Cursor& cursor) {
+  ModelBundle bundle;
+  bundle.spacing_mm = cursor.Take<double>();
+  bundle.resolution_mm = cursor.Take<double>();
+  bundle.chord_error_mm = cursor.Take<double>();
+  const auto faces = cursor.Take<std::uint64_t>();
+  for (std::uint64_t i = 0; i < faces && cursor.ok(); ++i) {
+    ASSIGN_OR_RETURN(ModelFace face, TakeFace(cursor));
+    bundle.faces.push_back(std::move(face));
+  }
+  bundle.vertices = cursor.TakeArray<Eigen::Vector3f>();
+  bundle.triangles = cursor.TakeArray<TriangleCorners>();
+  bundle.sample_points = cursor.TakeArray<Eigen::Vector3f>();
+  bundle.sample_normals = cursor.TakeArray<Eigen::Vector3f>();
+  if (!cursor.AtEnd())
+    return Fail(ErrorCode::kFormat, "the model bundle's counts do not add up to its length");
+  return bundle;
+}
+
+}  // namespace
+
+std::string EncodeBundle(const ModelBundle& bundle) {
+  const std::string payload = EncodePayload(bundle);
+  std::string bytes(kMagic, kMagicSize);
+  Put(bytes, kVersion);
+  Put(bytes, libdeflate_crc32(0, payload.data(), payload.size()));
+  Put(bytes, static_cast<std::uint64_t>(payload.size()));
+  return bytes + payload;
+}
+
+Result<ModelBundle> DecodeBundle(const std::string& bytes) {
+  if (bytes.size() < kHeaderSize || bytes.compare(0, kMagicSize, kMagic) != 0) {
+    return Fail(ErrorCode::kFormat, "not a model bundle: it does not begin with {} and a header", kMagic);
+  }
+  Cursor cursor(bytes, kMagicSize);
+  const auto version = cursor.Take<std::uint32_t>();
+  const auto expected_crc = cursor.Take<std::uint32_t>();
+  const auto size = cursor.Take<std::uint64_t>();
+  if (version != kVersion) {
+    return Fail(ErrorCode::kFormat, "model bundle of version {}, this program reads version {}", version,
+                kVersion);
+  }
+  if (size != bytes.size() - kHeaderSize) {
+    return Fail(ErrorCode::kFormat, "model bundle with {} bytes of payload, its header says {}",
+                bytes.size() - kHeaderSize, size);
+  }
+  const std::uint32_t crc = libdeflate_crc32(0, bytes.data() + kHeaderSize, size);
+  if (crc != expected_crc) {
+    return Fail(ErrorCode::kFormat, "model bundle is damaged: CRC-32 {:08x}, its header says {:08x}", crc,
+                expected_crc);
+  }
+  ASSIGN_OR_RETURN(ModelBundle bundle, DecodePayload(cursor));
+  bundle.checksum = crc;
+  RETURN_IF_ERROR(Check(bundle));
+  return bundle;
+}
+
+Status WriteBundle(const ModelBundle& bundle, const std::filesystem::path& path) {
+  const std::string bytes = EncodeBundle(bundle);
+  std::filesystem::path part = path;
+  part += ".part";
+  std::ofstream file(part, std::ios::binary | std::ios::trunc);
+  file.write(bytes.data(), static_cast<std::streamsize>(bytes.size())).flush();
+  const bool written = file.good();
+  file.close();
+  std::error_code renamed;
+  if (written) std::filesystem::rename(part, path, renamed);
+  if (written && !renamed) return {};
+  std::error_code ignored;
+  std::filesystem::remove(part, ignored);
+  return Fail(ErrorCode::kIo, "{}: cannot write {} bytes there", path.string(), bytes.size());
+}
+
+Result<std::string> ReadWholeFile(const std::filesystem::path& path) {
+  std::error_code error;
+  const std::uintmax_t size = std::filesystem::file_size(path, error);
+  if (error) return Fail(ErrorCode::kNotFound, "{}: no such file, or not readable", path.string());
+  if (size > kMaxFileBytes)
+    return Fail(ErrorCode::kFormat, "{}: {} bytes, at most 4 GiB are read", path.string(), size);
+  std::string bytes(size, '\0');
+  std::ifstream file(path, std::ios::binary);
+  if (!file.read(bytes.data(), static_cast<std::streamsize>(size))) {
+    return Fail(ErrorCode::kIo, "{}: cannot read its {} bytes", path.string(), size);
+  }
+  return bytes;
+}
+
+Result<ModelBundle> ReadBundle(const std::filesystem::path& path) {
+  ASSIGN_OR_RETURN(const std::string bytes, ReadWholeFile(path));
+  auto bundle = DecodeBundle(bytes);
+  if (bundle.ok()) return bundle;
+  return Fail(bundle.error().code, "{}: {}", path.string(), bundle.error().message);
+}
+
+}  // namespace forgescan

@@ -1,0 +1,28 @@
+// The model bundle as one binary file.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "services/common/model/model_bundle.h"
+#include "services/common/result.h"
+
+namespace forgescan {
+
+// Layout, little endian: "FSBUNDLE", u32 version, u32 CRC-32 of the payload, u64 payload bytes, payload
+// (arrays preceded by their u64 count).
+std::string EncodeBundle(const ModelBundle& bundle);
+
+// Errors: kFormat for a wrong magic, version, length, checksum or count; kInvalidArgument from
+// Check(ModelBundle).
+Result<ModelBundle> DecodeBundle(const std::string& bytes);
+
+// Writes beside the target and renames, so that no half file is ever seen under its name. Errors: kIo.
+Status WriteBundle(const ModelBundle& bundle, const std::filesystem::path& path);
+Result<ModelBundle> ReadBundle(const std::filesystem::path& path);
+
+// The whole file. Errors: kNotFound, kIo; kFormat if longer than 4 GiB.
+Result<std::string> ReadWholeFile(const std::filesystem::path& path);
+
+}  // namespace forgescan

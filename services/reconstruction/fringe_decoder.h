@@ -1,0 +1,48 @@
+// One camera's frames -> absolute projector coordinate of every pixel.
+#pragma once
+
+#include <opencv2/core/mat.hpp>
+#include <span>
+
+#include "services/common/result.h"
+#include "services/reconstruction/decoded_view.h"
+#include "services/reconstruction/fringe_order_table.h"
+#include "services/reconstruction/pattern_set.h"
+#include "services/reconstruction/phase_estimator.h"
+#include "services/reconstruction/reconstruction_config.h"
+
+namespace forgescan {
+
+// Everything that depends on the pattern and the thresholds only; made once, used for every view, from any
+// thread.
+class FringeDecoder {
+ public:
+  // Errors: those of Check(config), MakePhaseEstimator and MakeFringeOrderTable.
+  static Result<FringeDecoder> Create(PatternSet pattern, const ReconstructionConfig& config);
+
+  // Shape: pattern.frame_count() frames in order of frame_index, all of one size, CV_8UC1 or CV_16UC1.
+  // Errors: kInvalidArgument for a wrong number, size or type of frames. A view without one valid pixel is a
+  // result. Cost: bench/ holds the figures.
+  Result<DecodedView> Decode(std::span<const cv::Mat> frames) const;
+
+  const PatternSet& pattern() const { return pattern_; }
+  const PhaseEstimator& estimator() const { return estimator_; }
+  const FringeOrderTable& table() const { return table_; }
+
+ private:
+  FringeDecoder() = default;
+
+  PatternSet pattern_;
+  ReconstructionConfig config_;
+  PhaseEstimator estimator_;
+  FringeOrderTable table_;
+};
+
+// Errors: kInvalidArgument unless frames are count non-empty images of one size and type, CV_8UC1 or
+// CV_16UC1.
+Status CheckFrames(std::span<const cv::Mat> frames, int count);
+
+// Factor that brings a frame's grey values to 8-bit DN.
+double GreyScale(const cv::Mat& frame, const ReconstructionConfig& config);
+
+}  // namespace forgescan

@@ -1,0 +1,77 @@
+#include "services/reconstruction/phase_estimator.h"
+
+#include <Eigen/QR>
+#include <cmath>
+
+namespace forgescan {
+namespace {
+
+// Unknowns: the backgrounds first, then C and S of each frequency.
+Eigen::MatrixXd DesignMatrix(const PatternSet& pattern, int backgrounds) {
+  const int frequencies = static_cast<int>(pattern.frequencies.size());
+  Eigen::MatrixXd design = Eigen::MatrixXd::Zero(pattern.frame_count(), backgrounds + 2 * frequencies);
+  for (int j = 0; j < frequencies; ++j) {
+    const FringeFrequency& frequency = pattern.frequencies[static_cast<std::size_t>(j)];
+    for (std::size_t i = 0; i < frequency.frame_index.size(); ++i) {
+      const int frame = frequency.frame_index[i];
+      design(frame, backgrounds == 1 ? 0 : j) = 1;
+      design(frame, backgrounds + 2 * j) = std::cos(frequency.shift_rad[i]);
+      design(frame, backgrounds + 2 * j + 1) = -std::sin(frequency.shift_rad[i]);
+    }
+  }
+  return design;
+}
+
+std::vector<double> FusionWeights(const PhaseEstimator& estimator, const PatternSet& pattern) {
+  std::vector<double> weights;
+  double sum = 0;
+  for (std::size_t j = 0; j < pattern.frequencies.size(); ++j) {
+    const auto row = static_cast<Eigen::Index>(j);
+    const double noise = estimator.cosine.row(row).squaredNorm() + estimator.sine.row(row).squaredNorm();
+    const double scale = pattern.frequencies[j].period_px / pattern.frequencies[j].modulation_ratio;
+    weights.push_back(1 / (noise * scale * scale));
+    sum += weights.back();
+  }
+  for (double& weight : weights) {
+    weight /= sum;
+  }
+  return weights;
+}
+
+}  // namespace
+
+Result<PhaseEstimator> MakePhaseEstimator(const PatternSet& pattern) {
+  RETURN_IF_ERROR(Check(pattern));
+  const int frequencies = static_cast<int>(pattern.frequencies.size());
+  const int backgrounds = pattern.background == Background::kShared ? 1 : frequencies;
+  const Eigen::MatrixXd design = DesignMatrix(pattern, backgrounds);
+  Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver;
+  solver.setThreshold(1e-3);  // shifts nearer to singular than this would multiply the noise by hundreds
+  solver.compute(design);
+  if (solver.rank() < design.cols()) {
+    return Fail(ErrorCode::kDegenerate,
+                "the shifts of the pattern set do not determine its {} unknowns (rank {})", design.cols(),
+                solver.rank());
+  }
+  const Eigen::MatrixXd solution = solver.pseudoInverse();
+  PhaseEstimator estimator;
+  estimator.cosine.resize(frequencies, pattern.frame_count());
+  estimator.sine.resize(frequencies, pattern.frame_count());
+  estimator.background.resize(frequencies, pattern.frame_count());
+  for (int j = 0; j < frequencies; ++j) {
+    estimator.background.row(j) = solution.row(backgrounds == 1 ? 0 : j);
+    estimator.cosine.row(j) = solution.row(backgrounds + 2 * j);
+    estimator.sine.row(j) = solution.row(backgrounds + 2 * j + 1);
+  }
+  const Eigen::MatrixXd identity = Eigen::MatrixXd::Identity(pattern.frame_count(), pattern.frame_count());
+  estimator.residual = identity - design * solution;
+  if (pattern.reference_frame_index) {
+    estimator.residual.row(*pattern.reference_frame_index).setZero();  // not part of the model
+  }
+  const int fringe_frames = pattern.frame_count() - (pattern.reference_frame_index ? 1 : 0);
+  estimator.redundancy = fringe_frames - static_cast<int>(design.cols());
+  estimator.fusion = FusionWeights(estimator, pattern);
+  return estimator;
+}
+
+}  // namespace forgescan

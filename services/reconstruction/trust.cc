@@ -1,0 +1,241 @@
+#include "services/reconstruction/trust.h"
+
+#include <Eigen/Dense>
+#include <cmath>
+#include <complex>
+#include <numbers>
+#include <vector>
+
+#include "services/reconstruction/histogram_median.h"
+
+namespace forgescan {
+namespace {
+
+// Median of the rms of n normal values of standard deviation 1: what a robust rms divides by.
+double MedianOfRms(int n) { return n == 1 ? 0.6745 : 0.8326; }
+
+// Grey values that a 2nd harmonic of size 1 times B adds to the frames: column 0 in phase, column 1 in
+// quadrature.
+Eigen::MatrixX2d HarmonicFrames(const PatternSet& pattern, const std::vector<std::complex<double>>& phasors) {
+  Eigen::MatrixX2d frames = Eigen::MatrixX2d::Zero(pattern.frame_count(), 2);
+  for (std::size_t j = 0; j < phasors.size(); ++j) {
+    const FringeFrequency& frequency = pattern.frequencies[j];
+    const double modulation = std::abs(phasors[j]);
+    for (std::size_t i = 0; i < frequency.frame_index.size(); ++i) {
+      const double angle = 2 * (std::arg(phasors[j]) + frequency.shift_rad[i]);
+      frames(frequency.frame_index[i], 0) = modulation * std::cos(angle);
+      frames(frequency.frame_index[i], 1) = -modulation * std::sin(angle);
+    }
+  }
+  return frames;
+}
+
+// Phase errors of the frequencies by a change of the frames (first order).
+Eigen::VectorXd PhaseErrors(const PhaseEstimator& estimator, const std::vector<std::complex<double>>& phasors,
+                            const Eigen::VectorXd& change) {
+  Eigen::VectorXd errors(static_cast<Eigen::Index>(phasors.size()));
+  for (Eigen::Index j = 0; j < errors.size(); ++j) {
+    const std::complex<double> p = phasors[static_cast<std::size_t>(j)];
+    const double dc = estimator.cosine.row(j).dot(change), ds = estimator.sine.row(j).dot(change);
+    errors(j) = (p.real() * ds - p.imag() * dc) / std::norm(p);
+  }
+  return errors;
+}
+
+double SquaredDisagreement(const FringeOrderTable& table, const Eigen::VectorXd& errors) {
+  double sum = 0;
+  for (int o = 0; o < table.other_count; ++o) {
+    const auto at = static_cast<std::size_t>(o);
+    const double off = static_cast<double>(table.ratios[at]) * errors(table.base) - errors(table.others[at]);
+    sum += off * off;
+  }
+  return sum / table.other_count;
+}
+
+// Rms disagreement per unit of 2nd harmonic ratio, averaged over all phases; 0 where the frames cancel it.
+double HarmonicGain(const FringeDecoder& decoder) {
+  constexpr int kSteps = 8;
+  const auto count = decoder.pattern().frequencies.size();
+  double sum = 0;
+  int cases = 0;
+  for (int a = 0; a < kSteps; ++a) {
+    for (int b = 0; b < kSteps; ++b) {
+      for (int c = 0; c < kSteps; ++c) {
+        std::vector<std::complex<double>> phasors;
+        for (const int step : {a, b, c}) {
+          phasors.push_back(std::polar(1.0, 2 * std::numbers::pi * (step + 0.25) / kSteps));
+        }
+        phasors.resize(count);
+        const Eigen::VectorXd change = HarmonicFrames(decoder.pattern(), phasors).col(0);
+        sum += SquaredDisagreement(decoder.table(), PhaseErrors(decoder.estimator(), phasors, change));
+        ++cases;
+      }
+    }
+  }
+  return std::sqrt(sum / cases);
+}
+
+// Collects the figures pixel by pixel.
+class TrustSampler {
+ public:
+  TrustSampler(std::span<const cv::Mat> frames, const FringeDecoder& decoder,
+               const ReconstructionConfig& config)
+      : frames_(frames), decoder_(decoder), noise_(config.noise), scale_(GreyScale(frames[0], config)) {}
+
+  void AddSaturated() { ++saturated_; }
+
+  void Add(int row, int column, double disagreement_rad) {
+    const Eigen::VectorXd grey = Grey(row, column);
+    const PhaseEstimator& estimator = decoder_.estimator();
+    std::vector<std::complex<double>> phasors;
+    for (Eigen::Index j = 0; j < estimator.cosine.rows(); ++j) {
+      phasors.emplace_back(estimator.cosine.row(j).dot(grey), estimator.sine.row(j).dot(grey));
+    }
+    disagreement_.Add(disagreement_rad);
+    predicted_square_ += PredictedSquare(grey, phasors);
+    ++lit_;
+    if (estimator.redundancy > 0) {
+      AddResidual(estimator.residual * grey, phasors);
+    }
+  }
+
+  Result<TrustFigures> Finish() const {
+    if (lit_ == 0) {
+      return Fail(ErrorCode::kDegenerate, "no pixel shows fringes ({} of the sampled ones are saturated)",
+                  saturated_);
+    }
+    TrustFigures figures;
+    figures.disagreement_rad = disagreement_.Median() / MedianOfRms(decoder_.table().other_count);
+    figures.predicted_disagreement_rad = std::sqrt(predicted_square_ / static_cast<double>(lit_));
+    figures.saturated_fraction = static_cast<double>(saturated_) / static_cast<double>(saturated_ + lit_);
+    FinishHarmonic(figures);
+    return figures;
+  }
+
+ private:
+  Eigen::VectorXd Grey(int row, int column) const {
+    Eigen::VectorXd grey(static_cast<Eigen::Index>(frames_.size()));
+    for (std::size_t i = 0; i < frames_.size(); ++i) {
+      const cv::Mat& frame = frames_[i];
+      grey(static_cast<Eigen::Index>(i)) =
+          scale_ * (frame.depth() == CV_8U ? frame.at<std::uint8_t>(row, column)
+                                           : frame.at<std::uint16_t>(row, column));
+    }
+    return grey;
+  }
+
+  double PredictedSquare(const Eigen::VectorXd& grey,
+                         const std::vector<std::complex<double>>& phasors) const {
+    double sum = 0;
+    for (Eigen::Index i = 0; i < grey.size(); ++i) {
+      const double sigma = std::sqrt(noise_.read_noise_dn * noise_.read_noise_dn + noise_.gain_dn * grey(i));
+      const Eigen::VectorXd change = sigma * Eigen::VectorXd::Unit(grey.size(), i);
+      sum += SquaredDisagreement(decoder_.table(), PhaseErrors(decoder_.estimator(), phasors, change));
+    }
+    return sum;
+  }
+
+  void AddResidual(const Eigen::VectorXd& residual, const std::vector<std::complex<double>>& phasors) {
+    const Eigen::MatrixX2d harmonic =
+        decoder_.estimator().residual * HarmonicFrames(decoder_.pattern(), phasors);
+    normal_ += harmonic.transpose() * harmonic;
+    right_side_ += harmonic.transpose() * residual;
+    residual_square_ += residual.squaredNorm();
+    for (const auto& phasor : phasors) {
+      modulation_square_ += std::norm(phasor);
+    }
+  }
+
+  void FinishHarmonic(TrustFigures& figures) const {
+    if (decoder_.estimator().redundancy == 0) {
+      return;
+    }
+    // The frames show the harmonic only if a good part of it (here 1 %) is not swallowed by the model's own
+    // unknowns.
+    constexpr double kMinVisible = 0.01;
+    const bool visible = normal_.trace() / 2 > kMinVisible * modulation_square_;
+    double explained = 0;
+    if (visible) {
+      const Eigen::Vector2d ratio = normal_.completeOrthogonalDecomposition().solve(right_side_);
+      figures.second_harmonic_ratio = ratio.norm();
+      explained = ratio.dot(right_side_);
+    }
+    const double freedom = static_cast<double>(lit_) * decoder_.estimator().redundancy;
+    figures.noise_dn = std::sqrt(std::max(residual_square_ - explained, 0.0) / freedom);
+  }
+
+  std::span<const cv::Mat> frames_;
+  const FringeDecoder& decoder_;
+  CameraNoise noise_;
+  double scale_;
+  HistogramMedian disagreement_{0, 4, 40000};
+  long lit_ = 0;
+  long saturated_ = 0;
+  double predicted_square_ = 0;
+  double residual_square_ = 0;
+  double modulation_square_ = 0;
+  Eigen::Matrix2d normal_ = Eigen::Matrix2d::Zero();
+  Eigen::Vector2d right_side_ = Eigen::Vector2d::Zero();
+};
+
+bool IsLit(MaskCause cause) {
+  return cause != MaskCause::kSaturated && cause != MaskCause::kLowModulation && cause != MaskCause::kNoisy;
+}
+
+}  // namespace
+
+Result<TrustFigures> MeasureTrust(std::span<const cv::Mat> frames, const DecodedView& view,
+                                  const FringeDecoder& decoder, const ReconstructionConfig& config) {
+  constexpr double kSamples = 20000;
+  const int step =
+      std::max(1, static_cast<int>(std::sqrt(static_cast<double>(view.cause.total()) / kSamples)));
+  TrustSampler sampler(frames, decoder, config);
+  for (int row = step / 2; row < view.cause.rows; row += step) {
+    for (int column = step / 2; column < view.cause.cols; column += step) {
+      const auto cause = static_cast<MaskCause>(view.cause(row, column));
+      if (cause == MaskCause::kSaturated) {
+        sampler.AddSaturated();
+      } else if (IsLit(cause)) {
+        sampler.Add(row, column, static_cast<double>(view.disagreement_rad(row, column)));
+      }
+    }
+  }
+  ASSIGN_OR_RETURN(auto figures, sampler.Finish());
+  constexpr double kMinGain = 0.1;  // below it the frames cancel the 2nd harmonic
+  if (const double gain = HarmonicGain(decoder); gain > kMinGain) {
+    const double excess = std::max(
+        0.0, std::pow(figures.disagreement_rad, 2) - std::pow(figures.predicted_disagreement_rad, 2));
+    figures.suspected_second_harmonic = std::sqrt(excess) / gain;
+  }
+  return figures;
+}
+
+Status JudgeTrust(const TrustFigures& figures, const FringeDecoder& decoder,
+                  const ReconstructionConfig& config, const char* camera) {
+  const bool shared = decoder.pattern().background == Background::kShared;
+  if (figures.saturated_fraction > config.max_saturated_fraction) {
+    return Fail(ErrorCode::kUntrusted,
+                "{:.0f} % of the lit pixels of the {} camera are saturated, limit {:.0f} %: expose less",
+                100 * figures.saturated_fraction, camera, 100 * config.max_saturated_fraction);
+  }
+  if (figures.disagreement_rad > config.max_disagreement_rad) {
+    return Fail(ErrorCode::kUntrusted,
+                "the frequencies disagree by {:.3f} rad rms in the {} camera, limit {:.3f}: {}",
+                figures.disagreement_rad, camera, config.max_disagreement_rad,
+                shared ? "this projector is not linear enough for a shared background, or a frame is not "
+                         "what the pattern set says"
+                       : "a frame is not what the pattern set says, or the scene moved");
+  }
+  const auto harmonic =
+      figures.second_harmonic_ratio ? figures.second_harmonic_ratio : figures.suspected_second_harmonic;
+  if (shared && harmonic && *harmonic > config.max_shared_second_harmonic) {
+    return Fail(ErrorCode::kUntrusted,
+                "the projector's 2nd harmonic is about {:.3f} of the 1st in the {} camera, limit {:.3f}: "
+                "this projector is not "
+                "linear enough for a shared background",
+                *harmonic, camera, config.max_shared_second_harmonic);
+  }
+  return {};
+}
+
+}  // namespace forgescan

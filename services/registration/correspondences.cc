@@ -1,0 +1,155 @@
+#include "services/registration/correspondences.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "services/common/parallel_blocks.h"
+
+namespace forgescan {
+namespace {
+
+constexpr std::size_t kBlock = 512;     // points a thread takes at a time
+constexpr double kBiweight = 4.685;     // 95 % efficiency for normal residuals
+constexpr double kMadToSigma = 1.4826;  // for normal residuals
+constexpr double kSmallestScaleMm =
+    1e-3;  // rounding of single precision; keeps exact data from dividing by zero
+
+// Median of absolute values; moves the values about.
+double MedianOf(std::vector<float>& values) {
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+bool NormalsAgree(const ScanSample& sample, std::size_t i, const Eigen::Matrix3f& rotation,
+                  const Eigen::Vector3f& model_normal, float min_cosine) {
+  return sample.normals.empty() || (rotation * sample.normals[i]).dot(model_normal) >= min_cosine;
+}
+
+float Residual(const Pair& pair) { return (pair.point - pair.foot).dot(pair.normal); }
+
+}  // namespace
+
+ScanSample CropToModel(const PointCloud& scan, const RegistrationModel& model, const Eigen::Isometry3d& start,
+                       double margin_mm) {
+  const Eigen::Isometry3f motion = start.cast<float>();
+  const Eigen::Vector3f low = (model.box_low().array() - margin_mm).cast<float>();
+  const Eigen::Vector3f high = (model.box_high().array() + margin_mm).cast<float>();
+  ScanSample sample;
+  for (std::size_t i = 0; i < scan.size(); ++i) {
+    const Eigen::Vector3f p = motion * scan.points[i];
+    // A coordinate that is NaN fails both comparisons.
+    if (!((p.array() >= low.array()).all() && (p.array() <= high.array()).all())) continue;
+    if (!scan.normals.empty()) {
+      const float length = scan.normals[i].norm();
+      if (!(length > 0)) continue;
+      sample.normals.emplace_back(scan.normals[i] / length);
+    }
+    sample.points.push_back(scan.points[i]);
+  }
+  return sample;
+}
+
+ScanSample Thin(const ScanSample& sample, std::size_t max_points) {
+  const std::size_t step = std::max<std::size_t>(1, (sample.size() + max_points - 1) / max_points);
+  ScanSample thin;
+  for (std::size_t i = 0; i < sample.size(); i += step) {
+    thin.points.push_back(sample.points[i]);
+    if (!sample.normals.empty()) thin.normals.push_back(sample.normals[i]);
+  }
+  return thin;
+}
+
+std::vector<Pair> PairWithSamples(const ScanSample& sample, const RegistrationModel& model,
+                                  const Eigen::Isometry3d& model_from_scan, const IcpOptions& options) {
+  std::vector<Pair> pairs(sample.size());
+  const Eigen::Matrix3f rotation = model_from_scan.linear().cast<float>();
+  const auto min_cosine = static_cast<float>(std::cos(options.normal_limit_rad));
+  ForEachBlock(sample.size(), kBlock, options.threads, [&](std::size_t, std::size_t begin, std::size_t end) {
+    std::vector<Eigen::Vector3f> moved;
+    for (std::size_t i = begin; i < end; ++i) {
+      moved.emplace_back((model_from_scan * sample.points[i].cast<double>()).cast<float>());
+    }
+    const std::vector<NearestSample> nearest = model.FindSamples(moved);
+    for (std::size_t i = begin; i < end; ++i) {
+      const NearestSample& hit = nearest[i - begin];
+      const Eigen::Vector3f& normal = model.SampleNormal(hit.sample);
+      const bool agree = NormalsAgree(sample, i, rotation, normal, min_cosine);
+      pairs[i] = {moved[i - begin], model.SamplePoint(hit.sample), normal, hit.distance_mm,
+                  agree ? 1.0F : 0.0F};
+    }
+  });
+  return pairs;
+}
+
+std::vector<Pair> PairWithSurface(const ScanSample& sample, const RegistrationModel& model,
+                                  const Eigen::Isometry3d& model_from_scan, double reach_mm,
+                                  const IcpOptions& options) {
+  std::vector<Pair> pairs(sample.size());
+  const Eigen::Matrix3f rotation = model_from_scan.linear().cast<float>();
+  const auto min_cosine = static_cast<float>(std::cos(options.normal_limit_rad));
+  const auto reach = static_cast<float>(reach_mm);
+  ForEachBlock(sample.size(), kBlock, options.threads, [&](std::size_t, std::size_t begin, std::size_t end) {
+    std::uint32_t hint = TriangleIndex::kNoTriangle;
+    for (std::size_t i = begin; i < end; ++i) {
+      const Eigen::Vector3f p = (model_from_scan * sample.points[i].cast<double>()).cast<float>();
+      pairs[i] = {p, p, Eigen::Vector3f::Zero(), reach, 0.0F};
+      const auto hit = model.surface().Find(p, reach, hint);
+      if (!hit) continue;
+      hint = hit->triangle;
+      const Eigen::Vector3f& normal = model.surface().Normal(hit->triangle);
+      const bool agree = NormalsAgree(sample, i, rotation, normal, min_cosine);
+      pairs[i] = {p, hit->foot, normal, hit->distance_mm, agree ? 1.0F : 0.0F};
+    }
+  });
+  return pairs;
+}
+
+double AdaptiveThreshold(const std::vector<Pair>& pairs, double gate_mm, double floor_mm, double sigmas) {
+  double sum = 0, squares = 0, count = 0;
+  for (const Pair& pair : pairs) {
+    if (!(pair.weight > 0) || pair.distance_mm > gate_mm) continue;
+    const double d = pair.distance_mm;
+    sum += d;
+    squares += d * d;
+    ++count;
+  }
+  if (count == 0) return floor_mm;
+  const double mean = sum / count;
+  const double sigma = std::sqrt(std::max(squares / count - mean * mean, 0.0));
+  return std::max(floor_mm, std::min(gate_mm, mean + sigmas * sigma));
+}
+
+void KeepNearest(std::vector<Pair>& pairs, double threshold_mm, double keep_share) {
+  std::vector<float> distances;
+  for (const Pair& pair : pairs) {
+    if (pair.weight > 0 && pair.distance_mm <= threshold_mm) distances.push_back(pair.distance_mm);
+  }
+  if (distances.empty()) return;
+  const double last = keep_share * static_cast<double>(distances.size() - 1);
+  const auto limit = distances.begin() + static_cast<std::ptrdiff_t>(last);
+  std::nth_element(distances.begin(), limit, distances.end());
+  for (Pair& pair : pairs) {
+    if (pair.distance_mm > std::min(static_cast<double>(*limit), threshold_mm)) pair.weight = 0;
+  }
+}
+
+std::size_t WeighBiweight(std::vector<Pair>& pairs, double threshold_mm) {
+  std::vector<float> residuals;
+  for (Pair& pair : pairs) {
+    if (pair.distance_mm > threshold_mm) pair.weight = 0;
+    if (pair.weight > 0) residuals.push_back(std::abs(Residual(pair)));
+  }
+  const std::size_t within = residuals.size();
+  const double cut = kBiweight * std::max(kMadToSigma * MedianOf(residuals), kSmallestScaleMm);
+  for (Pair& pair : pairs) {
+    if (!(pair.weight > 0)) continue;
+    const double ratio = Residual(pair) / cut;
+    const double inside = std::max(0.0, 1 - ratio * ratio);
+    pair.weight = static_cast<float>(inside * inside);
+  }
+  return within;
+}
+
+}  // namespace forgescan

@@ -1,0 +1,46 @@
+// One step of point-to-plane alignment: the 6 x 6 system and what it says about the pose.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <vector>
+
+#include "services/common/result.h"
+
+namespace forgescan {
+
+using Matrix6 = Eigen::Matrix<double, 6, 6>;
+using Vector6 = Eigen::Matrix<double, 6, 1>;
+
+// A measured point with the surface point it belongs to. Units: mm. Frames: model.
+struct Pair {
+  Eigen::Vector3f point;
+  Eigen::Vector3f foot;
+  Eigen::Vector3f normal;  // unit, of the surface at foot
+  float distance_mm;
+  float weight;  // 0..1
+};
+
+// Rotations are about `center` and enter the system as reach_mm * angle, so that all six unknowns are mm.
+struct StepFrame {
+  Eigen::Vector3d center;
+  double reach_mm;
+};
+
+struct PoseStep {
+  Eigen::Isometry3d moved_from_before;  // exact rotation, from the exponential map
+  double rotation_mm;                   // angle * reach_mm: the most the rotation moves a point
+  double translation_mm;                // of the centre
+  double rms_mm;                        // weighted, point to plane, before the step
+  double
+      weakest_eigenvalue;  // of the weighted mean of J^T J: 0 = a motion the points do not see; at most 1/3
+  Matrix6 covariance;  // of (rotation about center in rad, translation of center in mm), from the residuals
+                       // as if independent
+};
+
+// Source: Eq. (5), (8), with the exact rotation in place of the linearised one. Sums run in the order of the
+// pairs. Errors: kDegenerate if fewer than 6 pairs have weight, or the weakest eigenvalue is below
+// min_eigenvalue.
+Result<PoseStep> SolveStep(const std::vector<Pair>& pairs, const StepFrame& frame, double min_eigenvalue);
+
+}  // namespace forgescan

@@ -1,0 +1,50 @@
+#include <cstdio>
+#include <memory>
+
+#include "services/common/model/bundle_file.h"
+#include "services/common/model/model_import.h"
+#include "tools/forgescan/command.h"
+
+namespace forgescan {
+namespace {
+
+struct Arguments {
+  std::string file, out;
+  ModelImportOptions import;
+};
+
+Status Import(const Arguments& arguments) {
+  ASSIGN_OR_RETURN(const ModelBundle bundle, LoadModel(arguments.file, arguments.import));
+  RETURN_IF_ERROR(WriteBundle(bundle, arguments.out));
+  std::printf("%zu faces, %zu triangles, %zu samples, resolution %.3f mm, checksum %08x\n",
+              bundle.faces.size(), bundle.triangles.size(), bundle.sample_points.size(), bundle.resolution_mm,
+              bundle.checksum);
+  for (const ModelFace& face : bundle.faces) {
+    std::printf("  %-24s %-9s %7u triangles", face.name.c_str(), FaceTypeName(face.type),
+                face.triangle_count);
+    if (face.radius_mm > 0) std::printf("  radius %.4f mm", face.radius_mm);
+    std::printf("\n");
+  }
+  return {};
+}
+
+}  // namespace
+
+void AddModelCommand(CLI::App& app, Status& outcome) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* command = app.add_subcommand("model", "Prepare design models");
+  command->require_subcommand(1);
+  CLI::App* import = command->add_subcommand("import", "Turn a STEP, STL or PLY file into a model bundle");
+  import->add_option("file", arguments->file, "design model: .step, .stp, .stl or .ply")->required();
+  import->add_option("--out", arguments->out, "the bundle to write")->required();
+  import->add_option("--spacing-mm", arguments->import.spacing_mm, "of the surface samples")
+      ->capture_default_str();
+  import
+      ->add_option("--chord-error-mm", arguments->import.tessellation.chord_error_mm,
+                   "of the triangles of a STEP file")
+      ->capture_default_str();
+  import->callback([arguments, &outcome] { outcome = Import(*arguments);
+});
+}  // namespace forgescan
+
+}  // namespace forgescan

@@ -1,0 +1,133 @@
+// forgescan reconstruct: image files of one view -> cloud.ply and, on request, what is known about its
+// quality.
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <string>
+#include <vector>
+
+#include "services/common/geometry/cloud_io.h"
+#include "services/reconstruction/reconstruct.h"
+#include "tools/forgescan/command.h"
+
+namespace forgescan {
+namespace {
+
+struct ReconstructArguments {
+  std::string left;
+  std::string right;
+  std::string calibration;
+  std::string pattern;
+  std::string out;
+  std::string json;
+  ReconstructionConfig config;
+};
+
+Result<std::vector<cv::Mat>> ReadFrames(const std::filesystem::path& directory, const PatternSet& pattern) {
+  std::vector<cv::Mat> frames;
+  for (const std::string& name : pattern.frame_names) {
+    const std::filesystem::path path = directory / name;
+    if (!std::filesystem::is_regular_file(path)) {
+      return Fail(ErrorCode::kNotFound, "{}: there is no such frame", path.string());
+    }
+    cv::Mat frame = cv::imread(path.string(), cv::IMREAD_UNCHANGED);
+    if (frame.empty()) {
+      return Fail(ErrorCode::kFormat, "{}: is not a readable image", path.string());
+    }
+    if (frame.type() != CV_8UC1 && frame.type() != CV_16UC1) {
+      return Fail(ErrorCode::kFormat, "{}: is not a grey image of 8 or 16 bit", path.string());
+    }
+    frames.push_back(std::move(frame));
+  }
+  return frames;
+}
+
+nlohmann::json ToJson(const CameraQuality& quality) {
+  nlohmann::json pixels;
+  for (int cause = 0; cause < kMaskCauses; ++cause) {
+    pixels[std::string(NameOf(static_cast<MaskCause>(cause)))] =
+        quality.pixels[static_cast<std::size_t>(cause)];
+  }
+  const auto number = [](const std::optional<double>& value) {
+    return value ? nlohmann::json(*value) : nlohmann::json(nullptr);
+  };
+  return {{"pixels", pixels},
+          {"repaired", quality.repaired},
+          {"median_modulation_dn", quality.median_modulation_dn},
+          {"median_noise_to_modulation", quality.median_noise_to_modulation},
+          {"measured_noise_dn", number(quality.trust.noise_dn)},
+          {"disagreement_rad", quality.trust.disagreement_rad},
+          {"predicted_disagreement_rad", quality.trust.predicted_disagreement_rad},
+          {"saturated_fraction", quality.trust.saturated_fraction},
+          {"second_harmonic_ratio", number(quality.trust.second_harmonic_ratio)},
+          {"suspected_second_harmonic", number(quality.trust.suspected_second_harmonic)}};
+}
+
+nlohmann::json ToJson(const Reconstruction& reconstruction) {
+  const ReconstructionQuality& quality = reconstruction.quality;
+  nlohmann::json json = {{"points", reconstruction.cloud_in_camera.size()},
+                         {"median_sigma_mm", quality.median_sigma_mm},
+                         {"candidates", quality.candidates},
+                         {"dropped",
+                          {{"no_partner", quality.no_partner},
+                           {"ambiguous", quality.ambiguous},
+                           {"left_right", quality.left_right},
+                           {"depth_range", quality.depth_range},
+                           {"no_normal", quality.no_normal},
+                           {"steep", quality.steep},
+                           {"projector", quality.projector}}},
+                         {"left", ToJson(quality.left)},
+                         {"right", ToJson(quality.right)}};
+  if (quality.median_projector_residual_px) {
+    json["median_projector_residual_px"] = *quality.median_projector_residual_px;
+  }
+  return json;
+}
+
+Status WriteJson(const std::filesystem::path& path, const nlohmann::json& json) {
+  std::ofstream file(path, std::ios::trunc);
+  file << json.dump(2) << '\n';
+  file.close();
+  if (!file) {
+    return Fail(ErrorCode::kIo, "{}: cannot be written", path.string());
+  }
+  return {};
+}
+
+Status RunReconstruct(const ReconstructArguments& arguments) {
+  ASSIGN_OR_RETURN(const auto pattern, LoadPatternSet(arguments.pattern));
+  ASSIGN_OR_RETURN(const auto calibration, LoadStereoCalibration(arguments.calibration));
+  ASSIGN_OR_RETURN(const auto left, ReadFrames(arguments.left, pattern));
+  ASSIGN_OR_RETURN(const auto right, ReadFrames(arguments.right, pattern));
+  ASSIGN_OR_RETURN(const auto result, Reconstruct(left, right, pattern, calibration, arguments.config));
+  if (!arguments.json.empty()) {
+    RETURN_IF_ERROR(WriteJson(arguments.json, ToJson(result)));
+  }
+  return WritePly(arguments.out, result.cloud_in_camera);
+}
+
+}  // namespace
+
+void AddReconstructCommand(CLI::App& app, Status& outcome) {
+  auto arguments = std::make_shared<ReconstructArguments>();
+  CLI::App* command = app.add_subcommand("reconstruct", "Fringe images of one view to a point cloud");
+  command->add_option("--left", arguments->left, "Directory with the left camera's frames")->required();
+  command->add_option("--right", arguments->right, "Directory with the right camera's frames")->required();
+  command->add_option("--calibration", arguments->calibration, "Stereo calibration (OpenCV file)")
+      ->required();
+  command->add_option("--pattern", arguments->pattern, "Pattern set (TOML)")->required();
+  command->add_option("--out", arguments->out, "Point cloud to write (PLY)")->required();
+  command->add_option("--json", arguments->json, "Quality figures to write (JSON)");
+  command->add_option("--read-noise-dn", arguments->config.noise.read_noise_dn,
+                      "Camera noise in the dark, 8-bit DN");
+  command->add_option("--gain-dn", arguments->config.noise.gain_dn,
+                      "Camera noise variance per grey value, 8-bit DN");
+  command->add_option("--full-scale-16bit-dn", arguments->config.full_scale_16bit_dn,
+                      "Largest value of 16-bit frames");
+  command->add_option("--threads", arguments->config.threads, "Threads to use");
+  command->callback([arguments, &outcome] { outcome = RunReconstruct(*arguments); });
+}
+
+}  // namespace forgescan
