@@ -34,9 +34,16 @@ std::string ViewStatus(std::int8_t status) {
 }
 
 ReportedRegistration Reported(const fsmsg::registration_t& from, bool converged) {
-  ReportedRegistration to{RegistrationStatus(from.status), from.reason,        from.iterations,    from.rms_mm,
-                          from.inlier_share,               from.foreign_share, from.shift_mm,      from.turn_rad,
-                          from.weakest_ratio,              {}};
+  ReportedRegistration to{RegistrationStatus(from.status),
+                          from.reason,
+                          from.iterations,
+                          from.rms_mm,
+                          from.inlier_share,
+                          from.foreign_share,
+                          from.shift_mm,
+                          from.turn_rad,
+                          from.weakest_ratio,
+                          {}};
   if (converged) {
     to.model_from_array.assign(std::begin(from.model_from_array), std::end(from.model_from_array));
   }
@@ -44,8 +51,9 @@ ReportedRegistration Reported(const fsmsg::registration_t& from, bool converged)
 }
 
 ReportedView Reported(const fsmsg::fused_view_t& from) {
-  return {from.view,  ViewStatus(from.status), from.reason, from.captured_utime,      from.temperature_degc,
-          from.scale, from.points,             from.modulation_median_dn, from.consistency_rms_rad};
+  return {from.view,           ViewStatus(from.status),   from.reason,
+          from.captured_utime, from.temperature_degc,     from.scale,
+          from.points,         from.modulation_median_dn, from.consistency_rms_rad};
 }
 
 // What a part that ends too early was waiting for.
@@ -93,9 +101,10 @@ bool PartInWork::Complete() const {
 
 std::string PartInWork::Obstacle() const {
   if (registration.has_value() && !converged()) {
-    return registration->reason.empty() ? fmt::format("The registration ended with status {} and gave no reason.",
-                                                      RegistrationStatus(registration->status))
-                                        : registration->reason;
+    return registration->reason.empty()
+               ? fmt::format("The registration ended with status {} and gave no reason.",
+                             RegistrationStatus(registration->status))
+               : registration->reason;
   }
   if (!cloud_error.empty()) {
     return cloud_error;
@@ -104,7 +113,8 @@ std::string PartInWork::Obstacle() const {
     return MissingSentence(*this);
   }
   if (cloud_in_model->size() != static_cast<std::size_t>(registration->points)) {
-    return fmt::format("The registration announced {} points, {} arrived.", registration->points, cloud_in_model->size());
+    return fmt::format("The registration announced {} points, {} arrived.", registration->points,
+                       cloud_in_model->size());
   }
   return "";
 }
@@ -158,7 +168,8 @@ ReportedTiming WithSteps(ReportedTiming timing_s, const PartInWork& work) {
   return timing_s;
 }
 
-fsmsg::verdict_t VerdictMessage(const PartReport& report, std::int64_t utime, const std::string& report_folder) {
+fsmsg::verdict_t VerdictMessage(const PartReport& report, std::int64_t utime,
+                                const std::string& report_folder) {
   fsmsg::verdict_t message{};
   message.utime = utime;
   message.part = report.part;

@@ -24,16 +24,16 @@ struct PartInWork {
   std::optional<fsmsg::fusion_result_t> fusion;
   std::optional<fsmsg::registration_t> registration;
   std::optional<PointCloud> cloud_in_model;
-  std::string cloud_error;                         // why the cloud cannot be used; empty = nothing wrong so far
-  std::map<std::string, std::int64_t> duration_us; // by step, summed over the views
+  std::string cloud_error;  // why the cloud cannot be used; empty = nothing wrong so far
+  std::map<std::string, std::int64_t> duration_us;  // by step, summed over the views
 
   bool converged() const;
   // Everything a verdict needs, and the fusion's word on the views, is here.
   bool Complete() const;
   // Why the part cannot be measured from what is here, one sentence; empty if it can.
   std::string Obstacle() const;
-  // us since 1970 UTC, of the last view; the next best event known otherwise. Never the time of arrival at this service, so
-  // that a replay gives the same.
+  // us since 1970 UTC, of the last view; the next best event known otherwise. Never the time of arrival at
+  // this service, so that a replay gives the same.
   std::int64_t EventUtime() const;
 };
 
@@ -41,6 +41,7 @@ struct PartInWork {
 PartReport ReportOf(const PartInWork& work);
 // The timing with the steps that messages told of so far.
 ReportedTiming WithSteps(ReportedTiming timing_s, const PartInWork& work);
-fsmsg::verdict_t VerdictMessage(const PartReport& report, std::int64_t utime, const std::string& report_folder);
+fsmsg::verdict_t VerdictMessage(const PartReport& report, std::int64_t utime,
+                                const std::string& report_folder);
 
 }  // namespace forgescan

@@ -24,8 +24,9 @@ Result<ReportConfig> ReportConfig::Load(ConfigTable table) {
 
 Status ReportConfig::Check() const {
   if (loss_settle_s >= part_timeout_s) {
-    return Fail(ErrorCode::kInvalidArgument, "report: loss_settle_s is {} s, it must be below part_timeout_s, {} s",
-                loss_settle_s, part_timeout_s);
+    return Fail(ErrorCode::kInvalidArgument,
+                "report: loss_settle_s is {} s, it must be below part_timeout_s, {} s", loss_settle_s,
+                part_timeout_s);
   }
   return uncertainty.Check();
 }

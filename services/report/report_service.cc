@@ -19,20 +19,23 @@ std::int64_t Us(double seconds) { return static_cast<std::int64_t>(seconds * kUs
 // "parts_ok", "parts_not_ok", ...
 std::string CounterName(Verdict verdict) {
   std::string name = "parts_" + std::string(VerdictText(verdict));
-  std::transform(name.begin(), name.end(), name.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  std::transform(name.begin(), name.end(), name.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   return name;
 }
 
 }  // namespace
 
 Result<std::shared_ptr<ReportService>> ReportService::Create(StreamHub& hub, ServiceMonitor& monitor,
-                                                             const ReportConfig& config, const ReportStation& station,
+                                                             const ReportConfig& config,
+                                                             const ReportStation& station,
                                                              const PartEvaluator& evaluator) {
   RETURN_IF_ERROR(config.Check());
   std::error_code failure;
   std::filesystem::create_directories(station.results_folder, failure);
   if (failure) {
-    return Fail(ErrorCode::kIo, "cannot make the results folder {}: {}", station.results_folder, failure.message());
+    return Fail(ErrorCode::kIo, "cannot make the results folder {}: {}", station.results_folder,
+                failure.message());
   }
   const std::string path = (std::filesystem::path(station.results_folder) / "history.sqlite").string();
   ASSIGN_OR_RETURN(History history, History::Open(path));
@@ -41,7 +44,8 @@ Result<std::shared_ptr<ReportService>> ReportService::Create(StreamHub& hub, Ser
       new ReportService(hub, monitor, {config, station, std::move(writer)}, evaluator));
 }
 
-ReportService::ReportService(StreamHub& hub, ServiceMonitor& monitor, Parts parts, const PartEvaluator& evaluator)
+ReportService::ReportService(StreamHub& hub, ServiceMonitor& monitor, Parts parts,
+                             const PartEvaluator& evaluator)
     : hub_(hub),
       monitor_(monitor),
       config_(parts.config),
@@ -101,7 +105,8 @@ void ReportService::SubscribeDurations() {
 }
 
 void ReportService::OnArrived(const fsmsg::part_arrived_t& message) {
-  if (const auto open = open_.find(message.part); open != open_.end() && open->second.work.arrived.has_value()) {
+  if (const auto open = open_.find(message.part);
+      open != open_.end() && open->second.work.arrived.has_value()) {
     Finish(message.part);  // the line counts from 1 again: this is another part with the same number
   }
   std::erase_if(finished_, [&message](const auto& finished) {
@@ -138,7 +143,8 @@ void ReportService::OnDuration(const fsmsg::processing_time_t& message) {
 void ReportService::OnSorted(const fsmsg::part_sorted_t& message) {
   monitor_.Count(message.acknowledged != 0 ? "sorted" : "sort_failed");
   if (message.acknowledged == 0) {
-    Note(Fail(ErrorCode::kUnavailable, "part {}: the line did not acknowledge the verdict: {}", message.part, message.reason));
+    Note(Fail(ErrorCode::kUnavailable, "part {}: the line did not acknowledge the verdict: {}", message.part,
+              message.reason));
   }
 }
 
@@ -234,7 +240,8 @@ void ReportService::Finish(int part) {
   }
   judged.folder_name = ReportFolderName(part, utime);
   Publish(report, utime);
-  judged.page = hub_.bus().At(report.verdict_utime + Us(config_.page_delay_s), [this, part] { WritePage(part); });
+  judged.page =
+      hub_.bus().At(report.verdict_utime + Us(config_.page_delay_s), [this, part] { WritePage(part); });
   judged_[part] = std::move(judged);
   TellState();
 }

@@ -1,5 +1,5 @@
-// The report service: collects what the other services say of a part, measures, judges, publishes ONE verdict, and keeps the
-// report. Several parts may be in work at once. See README.md for channels and faults.
+// The report service: collects what the other services say of a part, measures, judges, publishes ONE
+// verdict, and keeps the report. Several parts may be in work at once. See README.md for channels and faults.
 #pragma once
 
 #include <deque>
@@ -30,10 +30,12 @@ struct ReportStation {
 
 class ReportService {
  public:
-  // `evaluator` outlives the service. Errors: as ReportConfig::Check and History::Open; kIo if the results folder cannot be
-  // made.
-  static Result<std::shared_ptr<ReportService>> Create(StreamHub& hub, ServiceMonitor& monitor, const ReportConfig& config,
-                                                       const ReportStation& station, const PartEvaluator& evaluator);
+  // `evaluator` outlives the service. Errors: as ReportConfig::Check and History::Open; kIo if the results
+  // folder cannot be made.
+  static Result<std::shared_ptr<ReportService>> Create(StreamHub& hub, ServiceMonitor& monitor,
+                                                       const ReportConfig& config,
+                                                       const ReportStation& station,
+                                                       const PartEvaluator& evaluator);
   ReportService(const ReportService&) = delete;
   ReportService& operator=(const ReportService&) = delete;
   // Writes the pages that are still due.
@@ -90,7 +92,8 @@ class ReportService {
   CloudAssembler assembler_;
   std::map<int, Open> open_;      // by part
   std::map<int, Judged> judged_;  // by part
-  std::deque<std::pair<int, std::int64_t>> finished_;  // the last parts with a verdict and their event time, oldest first
+  std::deque<std::pair<int, std::int64_t>>
+      finished_;  // the last parts with a verdict and their event time, oldest first
   std::set<Bus::TimerId> loss_timers_;
 };
 

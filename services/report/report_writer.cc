@@ -54,7 +54,8 @@ Status ReportWriter::Remember(const PartReport& report, std::int64_t utime) {
 Result<std::vector<ReportedTrend>> ReportWriter::Trends(const PartReport& report) const {
   std::vector<ReportedTrend> trends;
   for (const JudgedDimension& dimension : report.dimensions) {
-    ASSIGN_OR_RETURN(std::vector<HistoryPoint> points, history_.LastValues(dimension.name, config_.trend_parts));
+    ASSIGN_OR_RETURN(std::vector<HistoryPoint> points,
+                     history_.LastValues(dimension.name, config_.trend_parts));
     trends.push_back(TrendOf(dimension.name, std::move(points)));
   }
   return trends;
@@ -70,15 +71,17 @@ Status ReportWriter::WritePage(const PartReport& report, const std::string& fold
 
 Status ReportWriter::WriteIndex(const std::string& station) const {
   ASSIGN_OR_RETURN(const std::vector<PartRecord> parts, history_.LastParts(config_.index_parts));
-  return WriteWholeFile((std::filesystem::path(results_folder_) / "index.html").string(), IndexHtml(station, parts));
+  return WriteWholeFile((std::filesystem::path(results_folder_) / "index.html").string(),
+                        IndexHtml(station, parts));
 }
 
 Result<std::vector<std::uint8_t>> PictureOf(const PointCloud& cloud_in_model, const PartEvaluator& evaluator,
                                             const ReportConfig& config) {
   ASSIGN_OR_RETURN(const std::vector<float> deviation_mm, evaluator.DeviationsMm(cloud_in_model));
-  ASSIGN_OR_RETURN(DeviationPicture picture,
-                   DrawDeviations({cloud_in_model.points, cloud_in_model.normals, deviation_mm, evaluator.ModelPoints()},
-                                  {config.picture_width_px, config.deviation_scale_mm}));
+  ASSIGN_OR_RETURN(
+      DeviationPicture picture,
+      DrawDeviations({cloud_in_model.points, cloud_in_model.normals, deviation_mm, evaluator.ModelPoints()},
+                     {config.picture_width_px, config.deviation_scale_mm}));
   return std::move(picture.png);
 }
 

@@ -1,4 +1,5 @@
-// Puts reports into the results folder and the history: report.json at once, the page with its picture afterwards.
+// Puts reports into the results folder and the history: report.json at once, the page with its picture
+// afterwards.
 #pragma once
 
 #include <string>
@@ -10,7 +11,8 @@
 
 namespace forgescan {
 
-// "20260301T081527Z-part-000012": sorts by time, and no two parts share it even if the line counts from 1 again.
+// "20260301T081527Z-part-000012": sorts by time, and no two parts share it even if the line counts from 1
+// again.
 std::string ReportFolderName(int part, std::int64_t utime);
 
 class ReportWriter {

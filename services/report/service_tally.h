@@ -12,7 +12,9 @@ namespace forgescan {
 
 class ServiceTally {
  public:
-  void Note(const fsmsg::service_state_t& state) { missing_[{state.name, state.session}] = state.messages_missing; }
+  void Note(const fsmsg::service_state_t& state) {
+    missing_[{state.name, state.session}] = state.messages_missing;
+  }
 
   // Given up by any service in any of its sessions seen.
   std::int64_t messages_missing() const;
