@@ -9,6 +9,10 @@ namespace {
 
 constexpr int kStillSteps = 3;             // motions below the limit in a row that end the fine stage
 constexpr double kCoarseStopShare = 0.05;  // of the sample spacing: what pairing with samples can resolve
+// While pairs still change, a direction may be badly seen for a moment: the coarse stage holds it, the fine
+// stage stops only at a fraction of the eigenvalue that the result must have.
+constexpr double kCoarseDamping = 1e-3;
+constexpr double kPassingShare = 0.1;
 
 struct Progress {
   Eigen::Isometry3d model_from_scan;
@@ -34,7 +38,12 @@ Status CheckScan(const PointCloud& scan, const Eigen::Isometry3d& start) {
               "the start pose is not a rigid motion (rotation orthonormal to 1e-3, finite)");
 }
 
-StepFrame FrameOf(const RegistrationModel& model) { return {model.center(), model.reach_mm()}; }
+StepFrame FrameOf(const RegistrationModel& model) {
+  const Eigen::Vector3d half = 0.5 * (model.box_high() - model.box_low());
+  // A flat or straight model still needs a lever to scale with.
+  const auto across = [&](int i, int j) { return std::max(std::hypot(half[i], half[j]), 1e-3); };
+  return {model.center(), {across(1, 2), across(2, 0), across(0, 1)}};
+}
 
 // Steps 3 to 7 with the k-d tree of samples, the threshold falling from the start's uncertainty to its floor.
 Result<Progress> AlignCoarse(const ScanSample& sample, const RegistrationModel& model,
@@ -44,7 +53,7 @@ Result<Progress> AlignCoarse(const ScanSample& sample, const RegistrationModel& 
     std::vector<Pair> pairs = PairWithSamples(sample, model, progress.model_from_scan, options);
     gate_mm = AdaptiveThreshold(pairs, gate_mm, floor_mm, options.threshold_sigmas);
     KeepNearest(pairs, gate_mm, options.keep_share);
-    ASSIGN_OR_RETURN(const PoseStep step, SolveStep(pairs, FrameOf(model), options.min_eigenvalue));
+    ASSIGN_OR_RETURN(const PoseStep step, SolveStep(pairs, FrameOf(model), {0, kCoarseDamping}));
     progress.model_from_scan = step.moved_from_before * progress.model_from_scan;
     ++progress.iterations;
     const double motion_mm = std::max(step.rotation_mm, step.translation_mm);
@@ -69,7 +78,8 @@ Result<FineResult> AlignFine(const ScanSample& sample, const RegistrationModel& 
     std::vector<Pair> pairs = PairWithSurface(sample, model, progress.model_from_scan, gate_mm, options);
     gate_mm = AdaptiveThreshold(pairs, gate_mm, options.threshold_floor_mm, options.threshold_sigmas);
     WeighBiweight(pairs, gate_mm);
-    ASSIGN_OR_RETURN(const PoseStep step, SolveStep(pairs, FrameOf(model), options.min_eigenvalue));
+    ASSIGN_OR_RETURN(const PoseStep step,
+                     SolveStep(pairs, FrameOf(model), {kPassingShare * options.min_eigenvalue}));
     progress.model_from_scan = step.moved_from_before * progress.model_from_scan;
     ++progress.iterations;
     const bool rests = step.rotation_mm < options.stop_mm && step.translation_mm < options.stop_mm;
@@ -95,7 +105,7 @@ Result<Registration> Describe(const ScanSample& sample, const RegistrationModel&
   result.inliers = WeighBiweight(pairs, result.threshold_mm);
   result.inlier_share = static_cast<double>(result.inliers) / static_cast<double>(pairs.size());
   result.capped_score_mm = score / static_cast<double>(pairs.size());
-  ASSIGN_OR_RETURN(const PoseStep step, SolveStep(pairs, FrameOf(model), options.min_eigenvalue));
+  ASSIGN_OR_RETURN(const PoseStep step, SolveStep(pairs, FrameOf(model), {options.min_eigenvalue}));
   result.rms_mm = step.rms_mm;
   result.weakest_eigenvalue = step.weakest_eigenvalue;
   result.covariance = step.covariance;

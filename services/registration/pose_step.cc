@@ -21,9 +21,9 @@ NormalEquations Accumulate(const std::vector<Pair>& pairs, const StepFrame& fram
   for (const Pair& pair : pairs) {
     if (!(pair.weight > 0)) continue;
     const Eigen::Vector3d normal = pair.normal.cast<double>();
-    const Eigen::Vector3d arm = (pair.point.cast<double>() - frame.center) / frame.reach_mm;
+    const Eigen::Vector3d arm = pair.point.cast<double>() - frame.center;
     Vector6 row;
-    row << arm.cross(normal), normal;
+    row << arm.cross(normal).cwiseQuotient(frame.reach_mm), normal;
     const double weight = pair.weight;
     const double residual_mm = (pair.point - pair.foot).cast<double>().dot(normal);
     sum.information.noalias() += weight * row * row.transpose();
@@ -36,7 +36,7 @@ NormalEquations Accumulate(const std::vector<Pair>& pairs, const StepFrame& fram
 }
 
 Eigen::Isometry3d ExactMotion(const Vector6& step, const StepFrame& frame) {
-  const Eigen::Vector3d rotation = step.head<3>() / frame.reach_mm;
+  const Eigen::Vector3d rotation = step.head<3>().cwiseQuotient(frame.reach_mm);
   const double angle = rotation.norm();
   Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();
   if (angle > 0) motion.linear() = Eigen::AngleAxisd(angle, rotation / angle).toRotationMatrix();
@@ -46,19 +46,20 @@ Eigen::Isometry3d ExactMotion(const Vector6& step, const StepFrame& frame) {
 
 }  // namespace
 
-Result<PoseStep> SolveStep(const std::vector<Pair>& pairs, const StepFrame& frame, double min_eigenvalue) {
+Result<PoseStep> SolveStep(const std::vector<Pair>& pairs, const StepFrame& frame, const StepGuard& guard) {
   const NormalEquations sum = Accumulate(pairs, frame);
   if (static_cast<double>(sum.pairs) < kUnknowns) {
     return Fail(ErrorCode::kDegenerate, "{} point pairs are left, a pose needs at least 6", sum.pairs);
   }
   const Eigen::SelfAdjointEigenSolver<Matrix6> eigen(sum.information / sum.weight);
   const double weakest = eigen.eigenvalues()[0];
-  if (!(weakest >= min_eigenvalue)) {
+  if (!(weakest >= guard.min_eigenvalue)) {
     return Fail(ErrorCode::kDegenerate,
                 "the points do not fix the pose: weakest eigenvalue {:.2g}, at least {:.2g} is needed",
-                weakest, min_eigenvalue);
+                weakest, guard.min_eigenvalue);
   }
-  const Matrix6 inverse = eigen.eigenvectors() * eigen.eigenvalues().cwiseInverse().asDiagonal() *
+  const Matrix6 inverse = eigen.eigenvectors() *
+                          (eigen.eigenvalues().array() + guard.damping).inverse().matrix().asDiagonal() *
                           eigen.eigenvectors().transpose() / sum.weight;
   const Vector6 step = -inverse * sum.gradient;
   PoseStep result;
@@ -68,7 +69,7 @@ Result<PoseStep> SolveStep(const std::vector<Pair>& pairs, const StepFrame& fram
   result.rms_mm = std::sqrt(sum.squares / sum.weight);
   result.weakest_eigenvalue = weakest;
   Vector6 units;
-  units << Eigen::Vector3d::Constant(1 / frame.reach_mm), Eigen::Vector3d::Ones();
+  units << frame.reach_mm.cwiseInverse(), Eigen::Vector3d::Ones();
   const double freedom = std::max(sum.weight - kUnknowns, 1.0);
   result.covariance = sum.squares / freedom * units.asDiagonal() * inverse * units.asDiagonal();
   return result;

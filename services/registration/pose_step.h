@@ -21,15 +21,23 @@ struct Pair {
   float weight;  // 0..1
 };
 
-// Rotations are about `center` and enter the system as reach_mm * angle, so that all six unknowns are mm.
+// Rotations are about `center` and enter the system as reach_mm * angle, so that all six unknowns are mm. One
+// reach per axis (the part's half diagonal across it): a long part turns about its own axis with a short
+// lever.
 struct StepFrame {
   Eigen::Vector3d center;
-  double reach_mm;
+  Eigen::Vector3d reach_mm;
+};
+
+struct StepGuard {
+  double min_eigenvalue;  // of the weighted mean of J^T J; below, the points do not fix the pose
+  double damping =
+      0;  // added to that mean's diagonal: a direction hardly seen stays where it is, others lose little
 };
 
 struct PoseStep {
   Eigen::Isometry3d moved_from_before;  // exact rotation, from the exponential map
-  double rotation_mm;                   // angle * reach_mm: the most the rotation moves a point
+  double rotation_mm;                   // angles * reach_mm: the most the rotation moves a point
   double translation_mm;                // of the centre
   double rms_mm;                        // weighted, point to plane, before the step
   double
@@ -41,6 +49,6 @@ struct PoseStep {
 // Source: Eq. (5), (8), with the exact rotation in place of the linearised one. Sums run in the order of the
 // pairs. Errors: kDegenerate if fewer than 6 pairs have weight, or the weakest eigenvalue is below
 // min_eigenvalue.
-Result<PoseStep> SolveStep(const std::vector<Pair>& pairs, const StepFrame& frame, double min_eigenvalue);
+Result<PoseStep> SolveStep(const std::vector<Pair>& pairs, const StepFrame& frame, const StepGuard& guard);
 
 }  // namespace forgescan

@@ -1,5 +1,5 @@
-// A real laser scan of a shelf of objects, three quarters of it foreign to the model. The data are public research data
-// and not in the repository: FORGESCAN_DATA_DIR names the folder that holds real-clutter/.
+// A real laser scan of a shelf of objects, three quarters of it foreign to the model. The data are public
+// research data and not in the repository: FORGESCAN_DATA_DIR names the folder that holds real-clutter/.
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -66,10 +66,12 @@ TEST(RealClutter, TwentyOfTwentyStartsReachTheKnownPose) {
     EXPECT_LT(Eigen::AngleAxisd(error.linear()).angle(), 0.2 * kDegree) << "start " << start;
     EXPECT_LT((error * center - center).norm(), 0.5) << "start " << start;
     if (std::getenv("FORGESCAN_VERBOSE") != nullptr) {
-      std::printf("%2d: %.3f deg %.3f mm, %d iterations, %zu of %zu inliers, threshold %.2f rms %.3f score %.2f eigen %.3g\n",
-                  start, Eigen::AngleAxisd(error.linear()).angle() / kDegree, (error * center - center).norm(),
-                  result->iterations, result->inliers, result->considered, result->threshold_mm, result->rms_mm,
-                  result->capped_score_mm, result->weakest_eigenvalue);
+      std::printf(
+          "%2d: %.3f deg %.3f mm, %d iterations, %zu of %zu inliers, threshold %.2f rms %.3f score %.2f "
+          "eigen %.3g\n",
+          start, Eigen::AngleAxisd(error.linear()).angle() / kDegree, (error * center - center).norm(),
+          result->iterations, result->inliers, result->considered, result->threshold_mm, result->rms_mm,
+          result->capped_score_mm, result->weakest_eigenvalue);
     }
   }
 }

@@ -22,6 +22,7 @@ constexpr int kDirections = 400;  // tried on the half sphere when there is no s
 constexpr std::size_t kTrialPoints = 500;
 constexpr int kCandidates = 5;  // best directions that are refined
 constexpr int kArcBins = 720;
+constexpr double kLeastArcDeg = 10;  // for a radius: below, noise decides whether it is a cylinder or a plane
 
 struct System {
   Matrix5 normal = Matrix5::Zero();
@@ -204,6 +205,11 @@ Result<CylinderFit> FitCylinder(std::span<const Eigen::Vector3d> points,
   std::vector<double> residuals;
   for (const Eigen::Vector3d& p : points) residuals.push_back(std::abs(cylinder.Residual(p)));
   cylinder.arc_deg = ArcDeg(points, cylinder, RejectionLimit(residuals, options.reject_sigmas));
+  if (!cylinder.radius_constrained && cylinder.arc_deg < kLeastArcDeg) {
+    return Fail(ErrorCode::kDegenerate,
+                "the points cover an arc of {:.1f} degrees, a radius needs at least {}", cylinder.arc_deg,
+                kLeastArcDeg);
+  }
   Eigen::Index largest = 0;
   cylinder.axis.cwiseAbs().maxCoeff(&largest);
   if (cylinder.axis[largest] < 0) cylinder.axis = -cylinder.axis;

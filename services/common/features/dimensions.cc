@@ -1,5 +1,6 @@
 #include "services/common/features/dimensions.h"
 
+#include <Eigen/Geometry>
 #include <array>
 #include <cmath>
 #include <map>

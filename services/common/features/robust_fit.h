@@ -13,6 +13,7 @@ namespace forgescan {
 struct RobustOptions {
   double reject_sigmas = 3;  // k; sigma is 1.4826 times the median of the absolute residuals
   int max_rounds = 10;
+  double max_rejected_share = 0.5;  // above, the points are of another shape
 };
 
 // How a feature came out of its points. Shape: points = used + rejected.
@@ -35,7 +36,8 @@ Status CheckPoints(std::span<const Eigen::Vector3d> points, std::size_t needed, 
 
 // Source: DOMAIN rule "drop > k sigma, refit until none is left": every round judges all points anew, so that
 // a point dropped early can come back. Fit: (points used, shape before or nullptr) -> Result<Shape>; Shape:
-// double Residual(point) const and FitQuality quality; kUnknowns. Errors: those of the fit.
+// double Residual(point) const and FitQuality quality; kUnknowns. Errors: those of the fit; kUntrusted if
+// too many points were rejected.
 template <typename Shape, typename Fit>
 Result<Shape> FitRobust(std::span<const Eigen::Vector3d> points, const RobustOptions& options,
                         const Fit& fit) {
@@ -59,6 +61,12 @@ Result<Shape> FitRobust(std::span<const Eigen::Vector3d> points, const RobustOpt
   double squares = 0;
   for (const Eigen::Vector3d& p : used) squares += shape.Residual(p) * shape.Residual(p);
   const double freedom = std::max(1.0, static_cast<double>(used.size()) - Shape::kUnknowns);
+  if (static_cast<double>(points.size() - used.size()) >
+      options.max_rejected_share * static_cast<double>(points.size())) {
+    return Fail(ErrorCode::kUntrusted,
+                "{} of {} points were rejected, at most {:.0f} % may be: they are of another shape",
+                points.size() - used.size(), points.size(), 100 * options.max_rejected_share);
+  }
   shape.quality = {points.size(), points.size() - used.size(), std::sqrt(squares / freedom)};
   return shape;
 }

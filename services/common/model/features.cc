@@ -2,6 +2,7 @@
 
 #include <toml++/toml.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
