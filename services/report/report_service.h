@@ -9,6 +9,9 @@
 #include <string>
 #include <utility>
 
+#include "fsmsg/part_sorted_t.hpp"
+#include "fsmsg/processing_time_t.hpp"
+#include "fsmsg/service_state_t.hpp"
 #include "services/common/bus/cloud_stream.h"
 #include "services/common/bus/stream_hub.h"
 #include "services/common/service/service_monitor.h"
