@@ -67,15 +67,20 @@ std::string Overview(const PartReport& report) {
 }
 
 std::string DimensionRow(const JudgedDimension& from) {
-  const std::string remark = from.reason.empty() ? "" : "<small>" + EscapeHtml(from.reason) + "</small>";
-  return "<tr>" + TextCell(EscapeHtml(from.name) + remark) + Cell(NumberText(from.nominal_mm, 3)) +
+  const std::string remark =
+      from.reason.empty() ? ""
+                          : fmt::format("<tr class=\"remark\"><td class=\"t\" colspan=\"10\">{}</td></tr>\n",
+                                        EscapeHtml(from.reason));
+  const char* kind = from.reason.empty() ? "<tr>" : "<tr class=\"remarked\">";
+  return kind + TextCell(EscapeHtml(from.name)) + Cell(NumberText(from.nominal_mm, 3)) +
          Cell(fmt::format("{} &hellip; {}", NumberText(from.lower_mm, 3), NumberText(from.upper_mm, 3))) +
          "<td class=\"strong\">" + NumberText(from.measured_mm, 3) + "</td>" +
          Cell(SignedText(from.deviation_mm, 3)) + Cell(NumberText(from.uncertainty_mm, 3)) +
          "<td class=\"c\">" + LimitsChart(from) + "</td>" + Cell(CountText(from.points)) +
          Cell(Percent(from.rejected_share)) +
          fmt::format("<td class=\"c\"><span class=\"chip {}\">{}</span></td></tr>\n",
-                     VerdictClass(from.verdict), VerdictLabel(from.verdict));
+                     VerdictClass(from.verdict), VerdictLabel(from.verdict)) +
+         remark;
 }
 
 std::string Dimensions(const PartReport& report) {

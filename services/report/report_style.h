@@ -35,6 +35,7 @@ td{text-align:right;padding:6px 8px;border-bottom:1px solid var(--line);white-sp
 tr:last-child td{border-bottom:0}
 th.t,td.t{text-align:left;white-space:normal}
 td.c,th.c{text-align:center}
+tr.remarked td{border-bottom:0}tr.remark td{color:var(--soft);font-size:13px;padding-top:0}
 td.strong{font-weight:650}
 td small{display:block;color:var(--soft);white-space:normal;text-align:left}
 .pair{display:grid;grid-template-columns:1fr 1fr;gap:16px}.pair section{margin-bottom:16px}

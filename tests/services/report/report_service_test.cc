@@ -253,15 +253,20 @@ TEST_F(ReportServiceTest, TwoPartsInterleaved) {
 TEST_F(ReportServiceTest, ALostSliceIsNotInspectedSoonAfterTheLoss) {
   SimBus& doomed = network_.AddNode();
   auto sender = std::make_unique<StreamHub>(doomed, "registration");
-  fsmsg::cloud_slice_t slice = SliceCloud(cloud_, Fusion(9).utime, 9, kAllViews)->front();
-  slice.slice_count = 3;
-  slice.points_total = 3 * slice.points;
-  for (int i = 0; i < 3; ++i) {
-    network_.SetFaults({.loss = i == 1 ? 1.0 : 0.0, .large_loss = i == 1 ? 1.0 : 0.0});
-    slice.slice = i;
-    slice.first_point = i * slice.points;
+  sender->Advertise(kRegisteredCloud);
+  network_.RunFor(kSecondUs);
+  cloud_.points.assign(140'000, {1, 2, 3});  // more than one slice holds
+  cloud_.normals.assign(cloud_.size(), {0, 0, 1});
+  cloud_.sigma_mm.assign(cloud_.size(), 0.02F);
+  cloud_.view.assign(cloud_.size(), 0);
+  const auto slices = SliceCloud(cloud_, Fusion(9).utime, 9, kAllViews);
+  ASSERT_TRUE(slices.ok());
+  ASSERT_GE(slices->size(), 2u);
+  for (const auto& slice : *slices) {
+    const double loss = slice.slice == 0 ? 1.0 : 0.0;
+    network_.SetFaults({.loss = loss, .large_loss = loss});
     ASSERT_TRUE(sender->Publish(kRegisteredCloud, slice).ok());
-    network_.RunFor(10'000);
+    network_.RunFor(1000);
   }
   sender.reset();  // nobody left to ask
   network_.RemoveNode(doomed);
