@@ -73,7 +73,8 @@ std::string DimensionRow(const JudgedDimension& from) {
                                         EscapeHtml(from.reason));
   const char* kind = from.reason.empty() ? "<tr>" : "<tr class=\"remarked\">";
   return kind + TextCell(EscapeHtml(from.name)) + Cell(NumberText(from.nominal_mm, 3)) +
-         Cell(fmt::format("{} &hellip; {}", NumberText(from.lower_mm, 3), NumberText(from.upper_mm, 3))) +
+         fmt::format("<td class=\"w\">{} &hellip; {}</td>", NumberText(from.lower_mm, 3),
+                     NumberText(from.upper_mm, 3)) +
          "<td class=\"strong\">" + NumberText(from.measured_mm, 3) + "</td>" +
          Cell(SignedText(from.deviation_mm, 3)) + Cell(NumberText(from.uncertainty_mm, 3)) +
          "<td class=\"c\">" + LimitsChart(from) + "</td>" + Cell(CountText(from.points)) +

@@ -36,7 +36,7 @@ tr:last-child td{border-bottom:0}
 th.t,td.t{text-align:left;white-space:normal}
 td.c,th.c{text-align:center}
 tr.remarked td{border-bottom:0}tr.remark td{color:var(--soft);font-size:13px;padding-top:0}
-td.strong{font-weight:650}
+td.strong{font-weight:650}td.w{min-width:78px}
 td small{display:block;color:var(--soft);white-space:normal;text-align:left}
 .pair{display:grid;grid-template-columns:1fr 1fr;gap:16px}.pair section{margin-bottom:16px}
 .picture{width:100%;height:auto;display:block}
@@ -57,8 +57,9 @@ a{color:#2b5fa8}
 @page{size:A4;margin:11mm}
 @media print{body{background:#fff;font-size:11px}main{max-width:none;padding:0}section{padding:10px 12px;margin-bottom:9px}
 section,figure,tr{break-inside:avoid}h1{font-size:26px}h2{font-size:14px;margin-bottom:8px;break-after:avoid}header{margin-bottom:12px}
-.badge{font-size:19px;padding:7px 18px}th,td{padding:3px 5px;font-size:10.5px}svg.bar{width:112px;height:20px}
-.tiles{grid-template-columns:repeat(auto-fit,minmax(105px,1fr));gap:8px 14px}.tiles div b{font-size:14px}.tiles div span{font-size:10px}
+.badge{font-size:19px;padding:7px 18px}th,td{padding:3px 4px;font-size:10px}th{font-size:9.5px}tr.remark td{font-size:10px}td.w{white-space:normal}svg.bar{width:84px;height:15px}
+.chip{font-size:9.5px;padding:1px 7px}td small{font-size:9.5px}.sub{white-space:nowrap}
+.tiles{grid-template-columns:repeat(auto-fit,minmax(94px,1fr));gap:8px 12px}.tiles div b{font-size:14px}.tiles div span{font-size:10px}
 .charts{grid-template-columns:repeat(auto-fill,minmax(215px,1fr));gap:10px 14px}footer{font-size:10px}}
 )css";
 

@@ -112,7 +112,7 @@ TEST(ReportHtml, DrawsATrendForEachDimensionAndMarksThePart) {
   EXPECT_EQ(Count(page, "<svg class=\"chart\""), 3u);
   EXPECT_EQ(Count(page, "class=\"ring\""), 3u);
   EXPECT_EQ(Count(page, "class=\"trend\""), 1u) << "one of the three is significant";
-  EXPECT_NE(page.find("to the lower limit (95 %)"), std::string::npos);
+  EXPECT_NE(page.find("to the lower limit (95\u00a0%)"), std::string::npos);
   EXPECT_NE(page.find("No significant trend over 19 parts"), std::string::npos);
   EXPECT_NE(page.find("no trend yet"), std::string::npos);
 }
