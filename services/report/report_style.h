@@ -55,7 +55,7 @@ footer{color:var(--soft);font-size:12.5px}footer p{margin:6px 0}
 a{color:#2b5fa8}
 @media(max-width:760px){.pair{grid-template-columns:1fr}}
 @page{size:A4;margin:11mm}
-@media print{body{background:#fff;font-size:11px}main{max-width:none;padding:0}section{padding:10px 12px;margin-bottom:9px}
+@media print{.pair{grid-template-columns:1fr 1fr;gap:9px}body{background:#fff;font-size:11px}main{max-width:none;padding:0}section{padding:10px 12px;margin-bottom:9px}
 section,figure,tr{break-inside:avoid}h1{font-size:26px}h2{font-size:14px;margin-bottom:8px;break-after:avoid}header{margin-bottom:12px}
 .badge{font-size:19px;padding:7px 18px}th,td{padding:3px 4px;font-size:10px}th{font-size:9.5px}tr.remark td{font-size:10px}td.w{white-space:normal}svg.bar{width:84px;height:15px}
 .chip{font-size:9.5px;padding:1px 7px}td small{font-size:9.5px}.sub{white-space:nowrap}
