@@ -268,10 +268,16 @@ void StripDecoder::ClassifyReference() {
   const auto per_modulation = static_cast<float>(1 / pattern_.reference_contrast);
   const auto sigmas = static_cast<float>(config_.reference_tolerance_sigma);
   const auto part = static_cast<float>(config_.reference_tolerance_modulation);
+  const auto gain = static_cast<float>(config_.noise.gain_dn);
+  // Variance of A + B / m in units of one grey value's: 1.8 on average for a 3-2-2 set, 0.6 for 4-4-4.
+  constexpr float kPredictionVariance = 2;
   for (int x = 0; x < length; ++x) {
     const auto at = static_cast<std::size_t>(x);
     const float wanted = std::min(background_[0][at] + per_modulation * modulation_[0][at], 255.0f);
-    const float limit = std::max(sigmas * grey_sigma_[at], part * modulation_[0][at]);
+    const float grey_variance = grey_sigma_[at] * grey_sigma_[at];
+    const float white_variance = grey_variance + gain * std::max(wanted - background_[0][at], 0.0f);
+    const float sigma = std::sqrt(white_variance + kPredictionVariance * grey_variance);
+    const float limit = std::max(sigmas * sigma, part * modulation_[0][at]);
     Mark(cause[at], std::abs(white[at] - wanted) > limit, MaskCause::kReference);
   }
 }
