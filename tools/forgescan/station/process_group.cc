@@ -35,7 +35,7 @@ std::string LastLine(const std::string& path) {
 
 Status ProcessGroup::Start(const std::string& name, const std::vector<std::string>& command) {
   std::filesystem::create_directories(log_folder_);
-  const std::string log = log_folder_ + "/" + name + ".log";
+  const std::string log = LogOf(name);
   std::vector<char*> arguments;
   for (const std::string& word : command) {
     arguments.push_back(const_cast<char*>(word.c_str()));
@@ -71,7 +71,7 @@ std::string ProcessGroup::Ended() {
     int status = 0;
     if (waitpid(process->pid, &status, WNOHANG) == process->pid) {
       const std::string text =
-          fmt::format("{} {}; see {}/{}.log", process->name, Fate(status), log_folder_, process->name);
+          fmt::format("{} {}: {}", process->name, Fate(status), LastLine(LogOf(process->name)));
       processes_.erase(process);
       return text;
     }
@@ -87,7 +87,7 @@ Status ProcessGroup::WaitForSuccess() {
     processes_.pop_back();
     if (status != 0) {
       return Fail(ErrorCode::kUnavailable, "{} {}: {}", process.name, Fate(status),
-                  LastLine(fmt::format("{}/{}.log", log_folder_, process.name)));
+                  LastLine(LogOf(process.name)));
     }
   }
   return {};
