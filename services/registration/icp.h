@@ -26,7 +26,7 @@ namespace forgescan {
 struct IcpOptions {
   double start_translation_mm = 10;   // how far the start may be off, at the model's centre
   double start_rotation_rad = 0.053;  // 3 degrees
-  double threshold_sigmas = 1;        // a of Eq. (6)
+  double threshold_sigmas = 2;        // a of Eq. (6); at 1.5 and below, a start in 20 of the test axle failed
   double keep_share = 0.7;            // step 5
   double threshold_floor_mm = 1;      // Eq. (6) goes no lower: noise and the deviations a good part may have
   double normal_limit_rad = 0.7;      // between scan and model normal; used where the scan has normals
@@ -35,10 +35,10 @@ struct IcpOptions {
   int max_iterations = 100;           // of each of the two stages
   double stop_mm = 0.002;             // motion of the far end, and of the centre
   std::size_t min_inliers = 500;
-  double min_inlier_share = 0.15;  // of the points in the grown box
-  double min_eigenvalue = 5e-4;    // see PoseStep: below, a direction is held by noise only
-  double score_cap_mm = 3;         // of Registration::capped_score_mm
-  unsigned threads = 0;            // 0: as many as the host has; the result does not depend on it
+  double min_inlier_share = 0.4;  // of the points in the grown box
+  double min_eigenvalue = 5e-4;   // see PoseStep: below, a direction is held by noise only
+  double score_cap_mm = 3;        // of Registration::capped_score_mm
+  unsigned threads = 0;           // 0: as many as the host has; the result does not depend on it
 };
 
 // Errors: kInvalidArgument with name, value and allowed range of the first wrong option.

@@ -29,6 +29,10 @@ Result<PartState> VirtualCell::Part(int part) const {
 }
 
 Result<ViewState> VirtualCell::View(const PartState& part, int view) const {
+  return View(part, view, config_.heat.first_view_s + view * config_.heat.view_interval_s);
+}
+
+Result<ViewState> VirtualCell::View(const PartState& part, int view, double time_s) const {
   if (view < 0 || static_cast<std::size_t>(view) >= config_.views.size()) {
     return Fail(ErrorCode::kInvalidArgument, "view is {}, the path has views 0 to {}", view,
                 config_.views.size() - 1);
@@ -36,7 +40,7 @@ Result<ViewState> VirtualCell::View(const PartState& part, int view) const {
   ViewState state;
   state.part = part.part;
   state.view = view;
-  state.time_s = config_.heat.first_view_s + view * config_.heat.view_interval_s;
+  state.time_s = time_s;
   ASSIGN_OR_RETURN(state.part_degc, TemperatureAfter(config_.heat.law, part.start_degc, state.time_s));
   ASSIGN_OR_RETURN(state.scale, SizeScale(state.part_degc, config_.heat.reference_degc));
   RandomStream reading(config_.seed, RandomUse::kPyrometer, {part.part, view});

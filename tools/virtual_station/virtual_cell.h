@@ -42,6 +42,8 @@ class VirtualCell {
   Result<PartState> Part(int part) const;
 
   // Errors: kInvalidArgument for a view that does not exist or a temperature outside the steel's tables.
+  Result<ViewState> View(const PartState& part, int view, double time_s) const;
+  // At the time the configuration plans for it.
   Result<ViewState> View(const PartState& part, int view) const;
 
   // Errors: as View.

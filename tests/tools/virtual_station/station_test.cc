@@ -83,7 +83,7 @@ TEST(Station, WritesFilesAndTruth) {
   std::ifstream stream(folder / "truth.json");
   const auto truth = nlohmann::json::parse(stream);
   EXPECT_EQ(truth["dimensions"].size(), 5u);
-  EXPECT_DOUBLE_EQ(truth["dimensions"]["total_length"]["value_mm"], part->size.total_length_mm);
+  EXPECT_DOUBLE_EQ(truth["dimensions"]["total_length"], part->size.total_length_mm);
   EXPECT_EQ(truth["views"].size(), config.views.size());
   EXPECT_FALSE(WriteTruth(cell, *part, "/nowhere/truth.json").ok());
   std::filesystem::remove_all(folder);

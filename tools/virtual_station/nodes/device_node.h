@@ -29,10 +29,14 @@ class DeviceNode {
 
   // Call every few milliseconds of simulated time, after the bus was drained.
   void Step(std::int64_t now_us) {
+    StepWire(now_us);
+    device_.Step(now_us);
+  }
+  // The bus side alone: the node is powered up and answers, the device behind it has not been started.
+  void StepWire(std::int64_t now_us) {
     if (!faults_.silent) {
       SendAll(canopen_.Step(now_us));
     }
-    device_.Step(now_us);
   }
 
   void SetFaults(const NodeFaults& faults) { faults_ = faults; }

@@ -1,0 +1,64 @@
+#include "services/report/model_evaluator.h"
+
+#include <thread>
+
+#include "services/common/features/select_points.h"
+#include "services/common/model/bundle_file.h"
+
+namespace forgescan {
+
+ModelEvaluator::ModelEvaluator(ModelBundle model, Features features, TriangleIndex index)
+    : model_(std::move(model)), features_(std::move(features)), index_(std::move(index)) {}
+
+Result<std::unique_ptr<ModelEvaluator>> ModelEvaluator::Load(const std::string& bundle_path,
+                                                             const std::string& features_path) {
+  ASSIGN_OR_RETURN(ModelBundle model, ReadBundle(bundle_path));
+  ASSIGN_OR_RETURN(Features features, LoadFeatures(features_path));
+  return Make(std::move(model), std::move(features));
+}
+
+Result<std::unique_ptr<ModelEvaluator>> ModelEvaluator::Make(ModelBundle model, Features features) {
+  ASSIGN_OR_RETURN(Features bound, BindFeatures(std::move(features), model));
+  ASSIGN_OR_RETURN(TriangleIndex index, TriangleIndex::Build(model.vertices, model.triangles));
+  return std::unique_ptr<ModelEvaluator>(
+      new ModelEvaluator(std::move(model), std::move(bound), std::move(index)));
+}
+
+std::vector<MeasuredDimension> ModelEvaluator::Dimensions() const {
+  std::vector<MeasuredDimension> dimensions;
+  for (const DimensionSpec& spec : features_.dimensions) {
+    MeasuredDimension dimension;
+    dimension.name = spec.name;
+    dimension.nominal_mm = spec.nominal_mm;
+    dimension.lower_mm = spec.lower_mm;
+    dimension.upper_mm = spec.upper_mm;
+    dimension.reference_degc = features_.reference_temperature_degc;
+    dimension.expanded_uncertainty_mm = spec.expanded_uncertainty_mm;
+    dimensions.push_back(std::move(dimension));
+  }
+  return dimensions;
+}
+
+Result<std::vector<MeasuredDimension>> ModelEvaluator::Evaluate(const PointCloud& cloud_in_model) const {
+  ASSIGN_OR_RETURN(const std::vector<DimensionResult> results,
+                   EvaluateDimensions(cloud_in_model, model_, features_, DimensionOptions{}));
+  std::vector<MeasuredDimension> dimensions = Dimensions();
+  if (results.size() != dimensions.size()) {
+    return Fail(ErrorCode::kUntrusted, "{} of {} dimensions were evaluated", results.size(),
+                dimensions.size());
+  }
+  for (std::size_t i = 0; i < results.size(); ++i) {
+    dimensions[i].measured_mm = results[i].measured_mm;
+    dimensions[i].fit_uncertainty_mm = results[i].standard_uncertainty_mm;
+    dimensions[i].points = static_cast<int>(results[i].points);
+    dimensions[i].rejected_share = results[i].removed_share;
+    dimensions[i].reason = results[i].reason;
+  }
+  return dimensions;
+}
+
+Result<std::vector<float>> ModelEvaluator::DeviationsMm(const PointCloud& cloud_in_model) const {
+  return SignedDeviations(cloud_in_model, index_, kMaxDeviationMm, std::thread::hardware_concurrency());
+}
+
+}  // namespace forgescan

@@ -1,0 +1,39 @@
+// Measures parts against a design model bundle and a features file.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "services/common/features/dimensions.h"
+#include "services/common/geometry/triangle_index.h"
+#include "services/common/model/features.h"
+#include "services/common/model/model_bundle.h"
+#include "services/report/part_evaluator.h"
+
+namespace forgescan {
+
+class ModelEvaluator final : public PartEvaluator {
+ public:
+  // Errors: as ReadBundle, LoadFeatures and BindFeatures.
+  static Result<std::unique_ptr<ModelEvaluator>> Load(const std::string& bundle_path,
+                                                      const std::string& features_path);
+  // Errors: as BindFeatures and TriangleIndex::Build.
+  static Result<std::unique_ptr<ModelEvaluator>> Make(ModelBundle model, Features features);
+
+  std::vector<MeasuredDimension> Dimensions() const override;
+  Result<std::vector<MeasuredDimension>> Evaluate(const PointCloud& cloud_in_model) const override;
+  // NaN for a point further than kMaxDeviationMm from the model.
+  Result<std::vector<float>> DeviationsMm(const PointCloud& cloud_in_model) const override;
+  const std::vector<Eigen::Vector3f>& ModelPoints() const override { return model_.sample_points; }
+
+  static constexpr double kMaxDeviationMm = 20.0;
+
+ private:
+  ModelEvaluator(ModelBundle model, Features features, TriangleIndex index);
+
+  ModelBundle model_;
+  Features features_;
+  TriangleIndex index_;
+};
+
+}  // namespace forgescan

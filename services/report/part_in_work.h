@@ -1,0 +1,47 @@
+// What has come of one part so far, and whether that is enough for a verdict.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+
+#include "fsmsg/fusion_result_t.hpp"
+#include "fsmsg/part_arrived_t.hpp"
+#include "fsmsg/registration_t.hpp"
+#include "fsmsg/scan_complete_t.hpp"
+#include "fsmsg/verdict_t.hpp"
+#include "services/common/geometry/point_cloud.h"
+#include "services/report/part_report.h"
+
+namespace forgescan {
+
+struct PartInWork {
+  int part = 0;
+  std::int64_t first_utime = 0;  // us since 1970 UTC, of the first message of the part
+  std::optional<fsmsg::part_arrived_t> arrived;
+  std::optional<fsmsg::scan_complete_t> scan;
+  std::optional<fsmsg::fusion_result_t> fusion;
+  std::optional<fsmsg::registration_t> registration;
+  std::optional<PointCloud> cloud_in_model;
+  std::string cloud_error;  // why the cloud cannot be used; empty = nothing wrong so far
+  std::map<std::string, std::int64_t> duration_us;  // by step, summed over the views
+
+  bool converged() const;
+  // Everything a verdict needs, and the fusion's word on the views, is here.
+  bool Complete() const;
+  // Why the part cannot be measured from what is here, one sentence; empty if it can.
+  std::string Obstacle() const;
+  // us since 1970 UTC, of the last view; the next best event known otherwise. Never the time of arrival at
+  // this service, so that a replay gives the same.
+  std::int64_t EventUtime() const;
+};
+
+// The part of the report that is a copy of the messages: registration, views, frames, times of the part.
+PartReport ReportOf(const PartInWork& work);
+// The timing with the steps that messages told of so far.
+ReportedTiming WithSteps(ReportedTiming timing_s, const PartInWork& work);
+fsmsg::verdict_t VerdictMessage(const PartReport& report, std::int64_t utime,
+                                const std::string& report_folder);
+
+}  // namespace forgescan

@@ -1,0 +1,24 @@
+// [report] of the station file.
+#pragma once
+
+#include "services/common/config/config.h"
+#include "services/report/uncertainty.h"
+
+namespace forgescan {
+
+struct ReportConfig {
+  double part_timeout_s = 90.0;     // from the first word of a part to its verdict, whatever is missing
+  double loss_settle_s = 2.0;       // from a lost message to the verdict on parts that wait for it
+  double page_delay_s = 0.5;        // from the verdict to the page: durations that come late still get on it
+  int trend_parts = 25;             // last parts drawn and fitted
+  int index_parts = 200;            // last parts listed in index.html
+  double deviation_scale_mm = 1.0;  // the colours of the picture end here
+  int picture_width_px = 2000;
+  UncertaintyBudget uncertainty;
+
+  // Reads the table and the table `uncertainty` in it. Errors: as ConfigTable, then Check().
+  static Result<ReportConfig> Load(ConfigTable table);
+  Status Check() const;
+};
+
+}  // namespace forgescan

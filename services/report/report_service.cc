@@ -1,0 +1,293 @@
+#include "services/report/report_service.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "services/common/bus/channels.h"
+#include "services/report/judge_dimensions.h"
+
+namespace forgescan {
+namespace {
+
+constexpr std::size_t kFinishedParts = 1000;  // a message later than that opens its part anew, and times out
+constexpr double kUsPerSecond = 1e6;
+
+std::int64_t Us(double seconds) { return static_cast<std::int64_t>(seconds * kUsPerSecond); }
+
+// "parts_ok", "parts_not_ok", ...
+std::string CounterName(Verdict verdict) {
+  std::string name = "parts_" + std::string(VerdictText(verdict));
+  std::transform(name.begin(), name.end(), name.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return name;
+}
+
+}  // namespace
+
+Result<std::shared_ptr<ReportService>> ReportService::Create(StreamHub& hub, ServiceMonitor& monitor,
+                                                             const ReportConfig& config,
+                                                             const ReportStation& station,
+                                                             const PartEvaluator& evaluator) {
+  RETURN_IF_ERROR(config.Check());
+  std::error_code failure;
+  std::filesystem::create_directories(station.results_folder, failure);
+  if (failure) {
+    return Fail(ErrorCode::kIo, "cannot make the results folder {}: {}", station.results_folder,
+                failure.message());
+  }
+  const std::string path = (std::filesystem::path(station.results_folder) / "history.sqlite").string();
+  ASSIGN_OR_RETURN(History history, History::Open(path));
+  ReportWriter writer(station.results_folder, std::move(history), config);
+  return std::shared_ptr<ReportService>(
+      new ReportService(hub, monitor, {config, station, std::move(writer)}, evaluator));
+}
+
+ReportService::ReportService(StreamHub& hub, ServiceMonitor& monitor, Parts parts,
+                             const PartEvaluator& evaluator)
+    : hub_(hub),
+      monitor_(monitor),
+      config_(parts.config),
+      station_(std::move(parts.station)),
+      writer_(std::move(parts.writer)),
+      evaluator_(evaluator) {
+  Subscribe();
+  SubscribeDurations();
+  hub_.Advertise(kVerdict);
+  TellState();
+}
+
+ReportService::~ReportService() {
+  while (!judged_.empty()) {
+    WritePage(judged_.begin()->first);
+  }
+  for (const auto& [part, open] : open_) {
+    hub_.bus().Cancel(open.timeout);
+  }
+  for (const Bus::TimerId timer : loss_timers_) {
+    hub_.bus().Cancel(timer);
+  }
+}
+
+void ReportService::Subscribe() {
+  hub_.Subscribe<fsmsg::part_arrived_t>(kPartArrived, [this](const auto& message) { OnArrived(message); });
+  hub_.Subscribe<fsmsg::scan_complete_t>(kScanComplete, [this](const auto& message) {
+    if (PartInWork* work = Find(message.part, message.utime); work != nullptr) {
+      work->scan = message;
+    }
+  });
+  hub_.Subscribe<fsmsg::fusion_result_t>(kFusionResult, [this](const auto& message) {
+    if (PartInWork* work = Find(message.part, message.utime); work != nullptr) {
+      work->fusion = message;
+      FinishIfComplete(message.part);
+    }
+  });
+  hub_.Subscribe<fsmsg::registration_t>(kRegistration, [this](const auto& message) {
+    if (PartInWork* work = Find(message.part, message.utime); work != nullptr) {
+      work->registration = message;
+      FinishIfComplete(message.part);
+    }
+  });
+  hub_.Subscribe<fsmsg::cloud_slice_t>(kRegisteredCloud, [this](const auto& message) { OnSlice(message); });
+  hub_.Subscribe<fsmsg::part_sorted_t>(kPartSorted, [this](const auto& message) { OnSorted(message); });
+  hub_.OnLost(kRegisteredCloud, [this](std::int64_t, std::int64_t) { OnLoss(); });
+  hub_.OnLost(kFusionResult, [this](std::int64_t, std::int64_t) { OnLoss(); });
+}
+
+void ReportService::SubscribeDurations() {
+  const auto note = [this](const fsmsg::processing_time_t& message) { OnDuration(message); };
+  hub_.Subscribe<fsmsg::processing_time_t>(kReconstructionTime, note);
+  hub_.Subscribe<fsmsg::processing_time_t>(kFusionTime, note);
+  hub_.Subscribe<fsmsg::processing_time_t>(kRegistrationTime, note);
+  SubscribeState<fsmsg::service_state_t>(hub_.bus(), kServiceState,
+                                         [this](const fsmsg::service_state_t& state) { tally_.Note(state); });
+}
+
+void ReportService::OnArrived(const fsmsg::part_arrived_t& message) {
+  if (const auto open = open_.find(message.part);
+      open != open_.end() && open->second.work.arrived.has_value()) {
+    Finish(message.part);  // the line counts from 1 again: this is another part with the same number
+  }
+  std::erase_if(finished_, [&message](const auto& finished) {
+    return finished.first == message.part && finished.second < message.utime;
+  });
+  if (PartInWork* work = Find(message.part, message.utime); work != nullptr) {
+    work->arrived = message;
+  }
+}
+
+void ReportService::OnSlice(const fsmsg::cloud_slice_t& message) {
+  PartInWork* work = Find(message.part, message.utime);
+  if (work == nullptr) {
+    return;
+  }
+  Result<std::optional<PointCloud>> cloud = assembler_.Add(message);
+  if (!cloud.ok()) {
+    work->cloud_error = fmt::format("The registered points cannot be used: {}.", cloud.error().message);
+    Note(cloud.error());
+  } else if (cloud->has_value()) {
+    work->cloud_in_model = std::move(**cloud);
+  }
+  FinishIfComplete(message.part);
+}
+
+void ReportService::OnDuration(const fsmsg::processing_time_t& message) {
+  if (const auto judged = judged_.find(message.part); judged != judged_.end()) {
+    judged->second.work.duration_us[message.step] += message.duration_us;
+  } else if (PartInWork* work = Find(message.part, message.utime); work != nullptr) {
+    work->duration_us[message.step] += message.duration_us;
+  }
+}
+
+void ReportService::OnSorted(const fsmsg::part_sorted_t& message) {
+  monitor_.Count(message.acknowledged != 0 ? "sorted" : "sort_failed");
+  if (message.acknowledged == 0) {
+    Note(Fail(ErrorCode::kUnavailable, "part {}: the line did not acknowledge the verdict: {}", message.part,
+              message.reason));
+  }
+}
+
+void ReportService::OnLoss() {
+  monitor_.Count("holes");
+  const auto timer = std::make_shared<Bus::TimerId>();
+  *timer = hub_.bus().At(hub_.bus().NowUs() + Us(config_.loss_settle_s), [this, timer] {
+    loss_timers_.erase(*timer);
+    FinishAfterLoss();
+  });
+  loss_timers_.insert(*timer);
+}
+
+PartInWork* ReportService::Find(int part, std::int64_t utime) {
+  if (const auto open = open_.find(part); open != open_.end()) {
+    return &open->second.work;
+  }
+  const auto same = [part](const auto& finished) { return finished.first == part; };
+  if (std::any_of(finished_.begin(), finished_.end(), same)) {
+    return nullptr;
+  }
+  Open& open = open_[part];
+  open.work.part = part;
+  open.work.first_utime = utime;
+  open.timeout = hub_.bus().At(hub_.bus().NowUs() + Us(config_.part_timeout_s), [this, part] {
+    monitor_.Count("parts_timed_out");
+    Finish(part);
+  });
+  TellState();
+  return &open.work;
+}
+
+void ReportService::FinishIfComplete(int part) {
+  if (open_.at(part).work.Complete()) {
+    Finish(part);
+  }
+}
+
+void ReportService::FinishAfterLoss() {
+  std::vector<int> waiting;
+  for (const auto& [part, open] : open_) {
+    if (open.work.registration.has_value()) {
+      waiting.push_back(part);
+    }
+  }
+  for (const int part : waiting) {
+    Finish(part);
+  }
+}
+
+PartReport ReportService::Judge(const PartInWork& work) const {
+  PartReport report = ReportOf(work);
+  report.station = station_.name;
+  report.software_version = station_.software_version;
+  report.config_hash = station_.config_hash;
+  report.counters.messages_missing = tally_.messages_missing();
+  report.counters.restarts = tally_.restarts();
+  const std::string obstacle = work.Obstacle();
+  const auto measured = obstacle.empty() ? evaluator_.Evaluate(*work.cloud_in_model)
+                                         : Result<std::vector<MeasuredDimension>>(evaluator_.Dimensions());
+  if (!obstacle.empty() || !measured.ok()) {
+    const std::string reason = obstacle.empty() ? measured.error().message : obstacle;
+    report.dimensions = NotInspected(evaluator_.Dimensions(), reason);
+    report.verdict = {Verdict::kNotInspected, reason};
+    return report;
+  }
+  report.dimensions = JudgeDimensions(*measured, config_.uncertainty, work.registration->reference_degc);
+  report.verdict = JudgePart(report.dimensions);
+  return report;
+}
+
+void ReportService::Finish(int part) {
+  if (judged_.contains(part)) {
+    WritePage(part);  // an earlier part with this number
+  }
+  const std::int64_t started_us = hub_.bus().NowUs();
+  Judged judged;
+  judged.work = std::move(open_.at(part).work);
+  hub_.bus().Cancel(open_.at(part).timeout);
+  open_.erase(part);
+  assembler_.Forget(part);
+  const std::int64_t utime = judged.work.EventUtime();
+  finished_.emplace_back(part, utime);
+  if (finished_.size() > kFinishedParts) {
+    finished_.pop_front();
+  }
+  judged.report = Judge(judged.work);
+  PartReport& report = judged.report;
+  report.verdict_utime = hub_.bus().NowUs();
+  report.timing_s.report = static_cast<double>(report.verdict_utime - started_us) / kUsPerSecond;
+  if (report.last_view_utime > 0) {
+    report.timing_s.last_frame_to_verdict = static_cast<double>(report.verdict_utime - utime) / kUsPerSecond;
+  }
+  judged.folder_name = ReportFolderName(part, utime);
+  Publish(report, utime);
+  judged.page =
+      hub_.bus().At(report.verdict_utime + Us(config_.page_delay_s), [this, part] { WritePage(part); });
+  judged_[part] = std::move(judged);
+  TellState();
+}
+
+// What goes wrong with files is told, but never keeps the verdict from the line.
+void ReportService::Publish(const PartReport& report, std::int64_t utime) {
+  const std::string folder_name = ReportFolderName(report.part, utime);
+  Note(writer_.WriteJson(report, folder_name));
+  Note(hub_.Publish(kVerdict, VerdictMessage(report, utime, folder_name)));
+  Note(writer_.Remember(report, utime));
+  monitor_.Count(CounterName(report.verdict.verdict));
+}
+
+void ReportService::WritePage(int part) {
+  Judged judged = std::move(judged_.extract(part).mapped());
+  hub_.bus().Cancel(judged.page);
+  PartReport& report = judged.report;
+  report.timing_s = WithSteps(report.timing_s, judged.work);
+  if (Result<std::vector<ReportedTrend>> trends = writer_.Trends(report); trends.ok()) {
+    report.trends = std::move(*trends);
+  } else {
+    Note(trends.error());
+  }
+  if (judged.work.converged() && judged.work.cloud_in_model.has_value()) {
+    Result<std::vector<std::uint8_t>> picture = PictureOf(*judged.work.cloud_in_model, evaluator_, config_);
+    if (picture.ok()) {
+      report.deviation_picture = std::move(*picture);
+    } else {
+      Note(picture.error());
+    }
+  }
+  Note(writer_.WriteJson(report, judged.folder_name));
+  Note(writer_.WritePage(report, judged.folder_name));
+  Note(writer_.WriteIndex(station_.name));
+}
+
+void ReportService::TellState() {
+  const bool idle = open_.empty();
+  monitor_.SetState(idle ? ServiceState::kReady : ServiceState::kWorking,
+                    idle ? "waiting for a part" : fmt::format("{} parts in work", open_.size()));
+}
+
+void ReportService::Note(const Status& status) {
+  if (!status.ok()) {
+    monitor_.ReportError(status.error());
+  }
+}
+
+}  // namespace forgescan

@@ -1,0 +1,103 @@
+// The report service: collects what the other services say of a part, measures, judges, publishes ONE
+// verdict, and keeps the report. Several parts may be in work at once. See README.md for channels and faults.
+#pragma once
+
+#include <deque>
+#include <map>
+#include <memory>
+#include <set>
+#include <string>
+#include <utility>
+
+#include "fsmsg/part_sorted_t.hpp"
+#include "fsmsg/processing_time_t.hpp"
+#include "fsmsg/service_state_t.hpp"
+#include "services/common/bus/cloud_stream.h"
+#include "services/common/bus/stream_hub.h"
+#include "services/common/service/service_monitor.h"
+#include "services/report/part_evaluator.h"
+#include "services/report/part_in_work.h"
+#include "services/report/report_config.h"
+#include "services/report/report_writer.h"
+#include "services/report/service_tally.h"
+
+namespace forgescan {
+
+// What of the station a report shows and needs.
+struct ReportStation {
+  std::string name;
+  std::string software_version;
+  std::string config_hash;
+  std::string results_folder;
+};
+
+class ReportService {
+ public:
+  // `evaluator` outlives the service. Errors: as ReportConfig::Check and History::Open; kIo if the results
+  // folder cannot be made.
+  static Result<std::shared_ptr<ReportService>> Create(StreamHub& hub, ServiceMonitor& monitor,
+                                                       const ReportConfig& config,
+                                                       const ReportStation& station,
+                                                       const PartEvaluator& evaluator);
+  ReportService(const ReportService&) = delete;
+  ReportService& operator=(const ReportService&) = delete;
+  // Writes the pages that are still due.
+  ~ReportService();
+
+ private:
+  struct Open {
+    PartInWork work;
+    Bus::TimerId timeout = 0;
+  };
+  // A part that has its verdict, but not its page.
+  struct Judged {
+    PartInWork work;
+    PartReport report;
+    std::string folder_name;
+    Bus::TimerId page = 0;
+  };
+
+  // What the service works with; made by Create().
+  struct Parts {
+    ReportConfig config;
+    ReportStation station;
+    ReportWriter writer;
+  };
+  ReportService(StreamHub& hub, ServiceMonitor& monitor, Parts parts, const PartEvaluator& evaluator);
+  void Subscribe();
+  void SubscribeDurations();
+
+  void OnArrived(const fsmsg::part_arrived_t& message);
+  void OnSlice(const fsmsg::cloud_slice_t& message);
+  void OnDuration(const fsmsg::processing_time_t& message);
+  void OnSorted(const fsmsg::part_sorted_t& message);
+  void OnLoss();
+
+  // The part in work, opened if it is new; nothing if it has its verdict already.
+  PartInWork* Find(int part, std::int64_t utime);
+  void FinishIfComplete(int part);
+  void Finish(int part);
+  // Parts whose registration is known, but whose other messages will not come any more.
+  void FinishAfterLoss();
+  PartReport Judge(const PartInWork& work) const;
+  void Publish(const PartReport& report, std::int64_t utime);
+  void WritePage(int part);
+  void TellState();
+  void Note(const Status& status);
+
+  StreamHub& hub_;
+  ServiceMonitor& monitor_;
+  ReportConfig config_;
+  ReportStation station_;
+  ReportWriter writer_;
+  const PartEvaluator& evaluator_;
+  ServiceTally tally_;
+  CloudAssembler assembler_;
+  std::map<int, Open> open_;      // by part
+  std::map<int, Judged> judged_;  // by part
+  std::deque<std::pair<int, std::int64_t>>
+      finished_;  // the last parts with a verdict and their event time, oldest first
+  std::set<Bus::TimerId> loss_timers_;
+};
+
+}  // namespace forgescan

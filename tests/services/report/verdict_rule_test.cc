@@ -1,0 +1,134 @@
+// The decision rule at and beside its boundaries, the part's verdict, and the uncertainty that goes into
+// both.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "services/report/judge_dimensions.h"
+
+namespace forgescan {
+namespace {
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+// Limits 10 to 12 mm, U = 0.25 mm: all of them exact in binary, so the boundaries are too.
+Verdict Judge(double measured_mm) { return JudgeSize(measured_mm, 0.25, 10.0, 12.0); }
+double Below(double value) { return std::nextafter(value, -1e9); }
+double Above(double value) { return std::nextafter(value, 1e9); }
+
+TEST(JudgeSize, Boundaries) {
+  EXPECT_EQ(Judge(11.0), Verdict::kOk);
+  EXPECT_EQ(Judge(10.25), Verdict::kOk);
+  EXPECT_EQ(Judge(Below(10.25)), Verdict::kNotDecidable);
+  EXPECT_EQ(Judge(10.0), Verdict::kNotDecidable);
+  EXPECT_EQ(Judge(9.75), Verdict::kNotDecidable);
+  EXPECT_EQ(Judge(Below(9.75)), Verdict::kNotOk);
+  EXPECT_EQ(Judge(11.75), Verdict::kOk);
+  EXPECT_EQ(Judge(Above(11.75)), Verdict::kNotDecidable);
+  EXPECT_EQ(Judge(12.25), Verdict::kNotDecidable);
+  EXPECT_EQ(Judge(Above(12.25)), Verdict::kNotOk);
+}
+
+TEST(JudgeSize, AToleranceNarrowerThanTwiceUIsNeverOk) {
+  for (double size_mm = 9.0; size_mm < 11.5; size_mm += 0.01) {
+    EXPECT_NE(JudgeSize(size_mm, 0.3, 10.0, 10.5), Verdict::kOk);
+  }
+}
+
+TEST(JudgeSize, WhatIsNotANumberIsNotInspected) {
+  EXPECT_EQ(JudgeSize(kNan, 0.1, 1.0, 2.0), Verdict::kNotInspected);
+  EXPECT_EQ(JudgeSize(1.5, kNan, 1.0, 2.0), Verdict::kNotInspected);
+  EXPECT_EQ(JudgeSize(1.5, -0.1, 1.0, 2.0), Verdict::kNotInspected);
+  EXPECT_EQ(JudgeSize(1.5, 0.1, kNan, 2.0), Verdict::kNotInspected);
+  EXPECT_EQ(JudgeSize(1.5, 0.1, 2.0, 1.0), Verdict::kNotInspected);
+}
+
+JudgedDimension Named(const std::string& name, Verdict verdict) {
+  JudgedDimension dimension;
+  dimension.name = name;
+  dimension.verdict = verdict;
+  return dimension;
+}
+
+TEST(JudgePart, TheWorstCertainThingGoesFirst) {
+  std::vector<JudgedDimension> dimensions = {Named("a", Verdict::kOk), Named("b", Verdict::kOk)};
+  EXPECT_EQ(JudgePart(dimensions).verdict, Verdict::kOk);
+  EXPECT_EQ(JudgePart(dimensions).reason, "");
+  dimensions.push_back(Named("c", Verdict::kNotDecidable));
+  EXPECT_EQ(JudgePart(dimensions).verdict, Verdict::kNotDecidable);
+  dimensions.push_back(Named("d", Verdict::kNotInspected));
+  EXPECT_EQ(JudgePart(dimensions).verdict, Verdict::kNotInspected);
+  dimensions.push_back(Named("e", Verdict::kNotOk));
+  dimensions.push_back(Named("f", Verdict::kNotOk));
+  EXPECT_EQ(JudgePart(dimensions).verdict, Verdict::kNotOk);
+  EXPECT_EQ(JudgePart(dimensions).reason, "Outside its limits by more than the uncertainty: e, f.");
+}
+
+TEST(JudgePart, NothingShownIsNothingInspected) {
+  EXPECT_EQ(JudgePart({}).verdict, Verdict::kNotInspected);
+  const std::vector<JudgedDimension> unknown = {Named("a", Verdict::kUnknown)};
+  EXPECT_EQ(JudgePart(unknown).verdict, Verdict::kNotInspected);
+}
+
+TEST(Uncertainty, IsTheRootOfTheSquares) {
+  const UncertaintyBudget budget{.view_matrix_mm = 0.03,
+                                 .scanner_mm = 0.0,
+                                 .refraction_mm = 0.04,
+                                 .temperature_k = 5.0,
+                                 .expansion_slope_per_k = 2e-5};
+  EXPECT_NEAR(ExpandedUncertaintyMm(budget, 0.0, 0.0), 2.0 * 0.05, 1e-12) << "mm, 3-4-5; rounding only";
+  EXPECT_NEAR(ExpandedUncertaintyMm(budget, 1200.0, 0.0), 2.0 * 0.13, 1e-12)
+      << "mm, 5-12-13 with 1200 mm * 1e-4";
+  EXPECT_TRUE(std::isnan(ExpandedUncertaintyMm(budget, 100.0, kNan)));
+}
+
+TEST(Uncertainty, DefaultsOfTheAxle) {
+  const UncertaintyBudget budget;
+  ASSERT_TRUE(budget.Check().ok());
+  EXPECT_NEAR(ExpandedUncertaintyMm(budget, 1888.0, 0.005), 0.2, 0.05)
+      << "mm, the budget of a hot length of 1888 mm";
+  EXPECT_NEAR(ExpandedUncertaintyMm(budget, 89.0, 0.01), 0.09, 0.02)
+      << "mm, the budget of a diameter of 89 mm";
+  EXPECT_FALSE(UncertaintyBudget{.scanner_mm = kNan}.Check().ok());
+  EXPECT_FALSE(UncertaintyBudget{.temperature_k = -1.0}.Check().ok());
+}
+
+MeasuredDimension Measured(double measured_mm) {
+  MeasuredDimension dimension;
+  dimension.name = "width";
+  dimension.nominal_mm = 100.0;
+  dimension.lower_mm = 99.0;
+  dimension.upper_mm = 101.0;
+  dimension.reference_degc = 900.0;
+  dimension.measured_mm = measured_mm;
+  dimension.points = 1000;
+  return dimension;
+}
+
+TEST(JudgeDimensions, MeasuresJudgesAndKeepsTheReason) {
+  MeasuredDimension missing = Measured(0.0);
+  missing.measured_mm.reset();
+  missing.reason = "Too few points.";
+  MeasuredDimension stated = Measured(100.5);
+  stated.expanded_uncertainty_mm = 0.6;
+  const std::vector<MeasuredDimension> measured = {Measured(100.25), missing, stated};
+  const auto judged = JudgeDimensions(measured, UncertaintyBudget{}, 900.0);
+  EXPECT_EQ(judged[0].verdict, Verdict::kOk);
+  EXPECT_EQ(judged[0].deviation_mm, 0.25);
+  EXPECT_EQ(judged[1].verdict, Verdict::kNotInspected);
+  EXPECT_EQ(judged[1].reason, "Too few points.");
+  EXPECT_TRUE(std::isnan(judged[1].measured_mm) && std::isnan(judged[1].deviation_mm));
+  EXPECT_EQ(judged[2].uncertainty_mm, 0.6);
+  EXPECT_EQ(judged[2].verdict, Verdict::kNotDecidable);
+}
+
+TEST(JudgeDimensions, LimitsOfAnotherTemperatureAreNotApplied) {
+  const std::vector<MeasuredDimension> measured = {Measured(100.0)};
+  EXPECT_EQ(JudgeDimensions(measured, {}, 905.0)[0].verdict, Verdict::kNotInspected);
+  EXPECT_EQ(JudgeDimensions(measured, {}, kNan)[0].verdict, Verdict::kNotInspected);
+  EXPECT_NE(JudgeDimensions(measured, {}, 905.0)[0].reason.find("905.0"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace forgescan
