@@ -15,7 +15,8 @@ using ::testing::HasSubstr;
 
 constexpr std::int64_t kSecondUs = 1'000'000;
 constexpr std::int64_t kPulsePeriodUs = 40'000;
-constexpr std::int64_t kClockOffsetUs = 7'654'321;  // camera clock - controller clock; the service is not told
+constexpr std::int64_t kClockOffsetUs =
+    7'654'321;  // camera clock - controller clock; the service is not told
 constexpr int kPatterns = 8;
 constexpr int kWidthPx = 32;
 constexpr int kHeightPx = 16;
@@ -76,8 +77,7 @@ class CameraServiceTest : public ::testing::Test {
     message.utime = network_.NowUs();
     message.part = part;
     message.view = view;
-    message.status =
-        captured ? fsmsg::view_captured_t::STATUS_CAPTURED : fsmsg::view_captured_t::STATUS_VOID;
+    message.status = captured ? fsmsg::view_captured_t::STATUS_CAPTURED : fsmsg::view_captured_t::STATUS_VOID;
     message.pulses_expected = kPatterns;
     ASSERT_TRUE(trigger_.Publish(kViewCaptured, message).ok());
   }
@@ -151,7 +151,8 @@ TEST_F(CameraServiceTest, NamesThePulseWhoseTriggerWasLost) {
   const auto manifest = FaultyThenWhole({.lost_trigger_chance = 1});
   EXPECT_EQ(manifest.frames_sent, kPatterns - 1);
   EXPECT_EQ(manifest.frames_missing, 1);
-  EXPECT_THAT(manifest.reason, AllOf(HasSubstr("part 1 view 0"), HasSubstr("pulse 4"), HasSubstr("no image")));
+  EXPECT_THAT(manifest.reason,
+              AllOf(HasSubstr("part 1 view 0"), HasSubstr("pulse 4"), HasSubstr("no image")));
   EXPECT_EQ(monitor_.counter("frames_missing"), 1);
 }
 

@@ -24,8 +24,7 @@ fsmsg::view_captured_t Captured(int view, int attempt = 0, bool captured = true)
   message.part = 7;
   message.view = view;
   message.attempt = attempt;
-  message.status =
-      captured ? fsmsg::view_captured_t::STATUS_CAPTURED : fsmsg::view_captured_t::STATUS_VOID;
+  message.status = captured ? fsmsg::view_captured_t::STATUS_CAPTURED : fsmsg::view_captured_t::STATUS_VOID;
   message.pulses_expected = kPulses;
   return message;
 }

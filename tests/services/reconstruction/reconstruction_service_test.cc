@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <opencv2/core.hpp>
+
 #include "services/common/bus/channels.h"
 #include "services/common/bus/cloud_stream.h"
 #include "services/common/bus/sim_bus.h"

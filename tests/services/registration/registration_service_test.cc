@@ -13,11 +13,11 @@ namespace forgescan {
 namespace {
 
 using testing::AxleSize;
+using ::testing::HasSubstr;
 using testing::MakeAxle;
 using testing::Moved;
 using testing::RandomMotion;
 using testing::ScanOf;
-using ::testing::HasSubstr;
 using Message = fsmsg::registration_t;
 
 constexpr std::int64_t kSecondUs = 1'000'000;
@@ -67,8 +67,7 @@ class RegistrationServiceTest : public ::testing::Test {
     fsmsg::fusion_result_t result{};
     result.utime = 4242;
     result.part = part;
-    result.status =
-        reason.empty() ? fsmsg::view_result_t::STATUS_OK : fsmsg::view_result_t::STATUS_VOID;
+    result.status = reason.empty() ? fsmsg::view_result_t::STATUS_OK : fsmsg::view_result_t::STATUS_VOID;
     result.reason = reason;
     result.reference_degc = 900;
     result.points = static_cast<std::int32_t>(points);
