@@ -3,14 +3,15 @@
 #include <unistd.h>
 
 #include <chrono>
+#include <csignal>
 #include <cstdio>
 #include <ctime>
 #include <filesystem>
 
 #include "services/common/bus/channels.h"
+#include "services/common/bus/stream_hub.h"
 #include "services/common/model/bundle_file.h"
 #include "services/common/model/model_import.h"
-#include "services/common/bus/stream_hub.h"
 #include "tools/forgescan/command.h"
 #include "tools/forgescan/station/interrupt.h"
 #include "tools/forgescan/station/network.h"
@@ -102,21 +103,22 @@ Result<fs::path> MakeRunFolder(const std::string& base) {
 }
 
 // The truth goes beside the report only now, when every service is done with the part.
-Status PublishTruth(const fs::path& run, const fsmsg::verdict_t& verdict) {
+Status PublishTruth(const fs::path& run, const Station& station, const fsmsg::verdict_t& verdict) {
   const fs::path truth = run / "truth" / fmt::format("part_{:06}.json", verdict.part);
+  const fs::path folder = fs::path(station.results) / verdict.report_folder;
   std::error_code problem;
-  fs::copy_file(truth, fs::path(verdict.report_folder) / "truth.json", fs::copy_options::overwrite_existing,
-                problem);
+  fs::copy_file(truth, folder / "truth.json", fs::copy_options::overwrite_existing, problem);
   if (problem) {
-    return Fail(ErrorCode::kIo, "{} cannot be copied to {}: {}", truth.string(), verdict.report_folder,
+    return Fail(ErrorCode::kIo, "{} cannot be copied to {}: {}", truth.string(), folder.string(),
                 problem.message());
   }
-  fmt::print("report {}\n", verdict.report_folder);
+  fmt::print("report {}\n", folder.string());
   return {};
 }
 
-Status InspectParts(StationRunner& runner, ProcessGroup& cell, const InspectOptions& options,
-                    const fs::path& run) {
+// Returns the verdicts, when the line has sorted every part.
+Result<std::vector<fsmsg::verdict_t>> InspectParts(StationRunner& runner, ProcessGroup& cell,
+                                                   const InspectOptions& options, const fs::path& run) {
   StreamHub hub(runner.bus(), "inspect");
   const Progress progress(hub);
   const Interrupt interrupt;
@@ -124,6 +126,7 @@ Status InspectParts(StationRunner& runner, ProcessGroup& cell, const InspectOpti
       cell.Start("virtual_station", {ProgramFolder() + "/forgescan-virtual-station", "run", "--run",
                                      run.string(), "--parts", std::to_string(options.parts)}));
   RETURN_IF_ERROR(runner.WaitUntilReady(kReadyPatienceUs));
+  cell.Signal(SIGUSR1);  // the line starts
   const auto patience_us = static_cast<std::int64_t>(options.part_patience_s * 1e6) * options.parts;
   const std::int64_t until_us = runner.bus().NowUs() + patience_us;
   while (progress.sorted() < options.parts) {
@@ -140,10 +143,7 @@ Status InspectParts(StationRunner& runner, ProcessGroup& cell, const InspectOpti
     }
   }
   fmt::print("\n{}\n", runner.Table(140, false));
-  for (const fsmsg::verdict_t& verdict : progress.verdicts()) {
-    RETURN_IF_ERROR(PublishTruth(run, verdict));
-  }
-  return {};
+  return progress.verdicts();
 }
 
 Status Prepare(const InspectOptions& options, const fs::path& run) {
@@ -165,10 +165,16 @@ Status Inspect(const InspectOptions& options) {
   RETURN_IF_ERROR(Prepare(options, run));
   ProcessGroup cell((run / "log").string());
   ASSIGN_OR_RETURN(const auto runner, StationRunner::Start((run / "station").string()));
-  const Status status = InspectParts(*runner, cell, options, run);
-  runner->Stop();
+  const auto verdicts = InspectParts(*runner, cell, options, run);
+  runner->Stop();  // the report service writes the pages that are still due
   cell.Stop();
-  return status;
+  if (!verdicts.ok()) {
+    return verdicts.error();
+  }
+  for (const fsmsg::verdict_t& verdict : *verdicts) {
+    RETURN_IF_ERROR(PublishTruth(run, runner->station(), verdict));
+  }
+  return {};
 }
 
 }  // namespace

@@ -93,6 +93,12 @@ Status ProcessGroup::WaitForSuccess() {
   return {};
 }
 
+void ProcessGroup::Signal(int signal) const {
+  for (const Process& process : processes_) {
+    kill(process.pid, signal);
+  }
+}
+
 bool ProcessGroup::WaitForEnd(pid_t pid) {
   const int fd = static_cast<int>(syscall(SYS_pidfd_open, pid, 0));
   pollfd ended{fd, POLLIN, 0};

@@ -25,6 +25,8 @@ class ProcessGroup {
   // Waits for all to end by themselves. Errors: kUnavailable (one failed; the end of its log is in the
   // sentence).
   Status WaitForSuccess();
+  // Sends a signal to all.
+  void Signal(int signal) const;
   // SIGTERM to one after the other, last started first; SIGKILL for one that has not ended after 10 s.
   void Stop();
 
