@@ -275,7 +275,7 @@ void StripDecoder::ClassifyReference() {
     const auto at = static_cast<std::size_t>(x);
     const float wanted = std::min(background_[0][at] + per_modulation * modulation_[0][at], 255.0f);
     const float wanted_sigma = reference_noise_ * grey_sigma_[at];
-    const float variance = wanted_sigma * wanted_sigma + read_variance + gain * white[at];
+    const float variance = wanted_sigma * wanted_sigma + read_variance + gain * std::max(wanted, 0.0f);
     const float limit = std::max(sigmas * std::sqrt(variance), part * modulation_[0][at]);
     Mark(cause[at], std::abs(white[at] - wanted) > limit, MaskCause::kReference);
   }

@@ -29,6 +29,8 @@ struct InspectOptions {
   std::string station = "stations/virtual";
   std::string out = "runs";
   std::string cell = "cell.toml";
+  double takt_s = 45.0;
+  int scale_divisor = 0;  // 0: as the cell file says
   double part_patience_s = 300.0;
 };
 
@@ -123,8 +125,9 @@ Result<std::vector<fsmsg::verdict_t>> InspectParts(StationRunner& runner, Proces
   const Progress progress(hub);
   const Interrupt interrupt;
   RETURN_IF_ERROR(
-      cell.Start("virtual_station", {ProgramFolder() + "/forgescan-virtual-station", "run", "--run",
-                                     run.string(), "--parts", std::to_string(options.parts)}));
+      cell.Start("virtual_station",
+                 {ProgramFolder() + "/forgescan-virtual-station", "run", "--run", run.string(), "--parts",
+                  std::to_string(options.parts), "--takt-s", std::to_string(options.takt_s)}));
   RETURN_IF_ERROR(runner.WaitUntilReady(kReadyPatienceUs));
   cell.Signal(SIGUSR1);  // the line starts
   const auto patience_us = static_cast<std::int64_t>(options.part_patience_s * 1e6) * options.parts;
@@ -148,9 +151,18 @@ Result<std::vector<fsmsg::verdict_t>> InspectParts(StationRunner& runner, Proces
 
 Status Prepare(const InspectOptions& options, const fs::path& run) {
   ProcessGroup prepare((run / "log").string());
-  RETURN_IF_ERROR(prepare.Start("virtual_station_prepare",
-                                {ProgramFolder() + "/forgescan-virtual-station", "prepare", "--station",
-                                 options.station, "--cell", options.cell, "--run", run.string()}));
+  std::vector<std::string> command{ProgramFolder() + "/forgescan-virtual-station",
+                                   "prepare",
+                                   "--station",
+                                   options.station,
+                                   "--cell",
+                                   options.cell,
+                                   "--run",
+                                   run.string()};
+  if (options.scale_divisor != 0) {
+    command.insert(command.end(), {"--scale-divisor", std::to_string(options.scale_divisor)});
+  }
+  RETURN_IF_ERROR(prepare.Start("virtual_station_prepare", command));
   RETURN_IF_ERROR(prepare.WaitForSuccess());
   ASSIGN_OR_RETURN(const Station station, Station::Load((run / "station").string()));
   ASSIGN_OR_RETURN(const ModelBundle model, LoadModel(run / "station" / "model" / "axle.step", {}));
@@ -187,6 +199,11 @@ void AddInspectCommand(CLI::App& app, Status& outcome) {
       ->check(CLI::ExistingDirectory);
   command->add_option("--cell", options.cell, "imperfections of the cell: a file of the station's folder");
   command->add_option("--out", options.out, "folder for the runs");
+  command->add_option("--takt", options.takt_s, "seconds from part to part")
+      ->check(CLI::Range(20.0, 3600.0))
+      ->capture_default_str();
+  command->add_option("--scale-divisor", options.scale_divisor, "smaller images; the station must say so too")
+      ->check(CLI::IsMember({1, 2, 4, 8}));
   command->add_option("--patience", options.part_patience_s, "seconds a part may take")
       ->check(CLI::Range(1.0, 1e5));
   command->callback([&outcome] { outcome = Inspect(options); });

@@ -17,6 +17,7 @@ constexpr int kStepMs = 1;
 // From the robot's order to the middle of the exposures: what is not the move itself.
 constexpr double kSettleAndHalfCaptureS = 0.75;
 constexpr double kPartHeatLoadW = 60.0;
+constexpr std::int64_t kTransportUs = 1'500'000;  // one part out, the next in
 
 // The edge's time base: the cameras stamp with it.
 std::int64_t MonotonicUs() {
@@ -40,7 +41,7 @@ RobotSimConfig RobotOf(const CellConfig& config) {
 LineSimConfig LineOf(const LiveCellOptions& options) {
   LineSimConfig line;
   line.takt_us = static_cast<std::int64_t>(options.takt_s * 1e6);
-  line.dwell_us = line.takt_us - 5'000'000;
+  line.dwell_us = line.takt_us - kTransportUs;
   line.parts = options.parts;
   return line;
 }
@@ -136,10 +137,8 @@ void LiveCell::FollowRobot(std::int64_t elapsed_us) {
   const auto rendered = renderer_.Find(part_, view);
   // The arm is held just short of the view while its picture is not there.
   robot_.SetFaults({.stuck = rendered == nullptr});
-  if (rendered == nullptr) {
-    held_us_ += robot_.progress() >= 1.0 ? elapsed_us : 0;
-  } else {
-    taken_[part_].insert_or_assign(view, rendered->state);
+  if (rendered == nullptr && robot_.progress() >= 1.0) {
+    held_us_ += elapsed_us;
   }
 }
 
@@ -163,6 +162,9 @@ Status LiveCell::FollowSorting() {
 }
 
 void LiveCell::OnEdge(const TriggerSim::Edge& edge) {
+  if (const auto rendered = renderer_.Find(part_, edge.view); rendered != nullptr) {
+    taken_[part_].insert_or_assign(edge.view, rendered->state);
+  }
   cameras_[edge.right ? 1 : 0]->Edge(edge.utime * 1000, TagOf(part_, edge));
 }
 
