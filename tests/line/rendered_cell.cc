@@ -14,12 +14,19 @@ namespace fs = std::filesystem;
 
 constexpr int kScaleDivisor = 4;
 constexpr int kThreads = 2;
-constexpr double kSteelFromDegc = 700, kSteelToDegc = 1000, kSteelStepDegc = 10;
+const fs::path kStation = FORGESCAN_SOURCE_DIR "/stations/virtual";
 
 Status WriteFiles(const CellConfig& config, const fs::path& folder) {
   RETURN_IF_ERROR(WriteStation(config, PatternSet::kReduced, folder.string()));
+  std::error_code problem;
+  fs::copy_file(kStation / "station.toml", folder / "station.toml", fs::copy_options::overwrite_existing,
+                problem);
+  if (problem) {
+    return Fail(ErrorCode::kIo, "{} cannot be copied: {}", (kStation / "station.toml").string(),
+                problem.message());
+  }
   ASSIGN_OR_RETURN(const ModelBundle model, LoadModel(folder / "model" / "axle.step", {}));
-  return WriteBundle(model, folder / "model" / "axle.fsm");
+  return WriteBundle(model, folder / "model" / "axle.bundle");
 }
 
 }  // namespace
@@ -40,8 +47,7 @@ RenderedCell::~RenderedCell() {
 }
 
 Result<std::unique_ptr<RenderedCell>> RenderedCell::Create() {
-  ASSIGN_OR_RETURN(CellConfig config,
-                   LoadCellConfig(FORGESCAN_SOURCE_DIR "/stations/virtual/cell.toml", kScaleDivisor));
+  ASSIGN_OR_RETURN(CellConfig config, LoadCellConfig(kStation / "cell.toml", kScaleDivisor));
   const fs::path folder = fs::temp_directory_path() / fmt::format("forgescan_line_{}", ::getpid());
   RETURN_IF_ERROR(WriteFiles(config, folder));
   return std::unique_ptr<RenderedCell>(new RenderedCell(std::make_unique<Cell>(std::move(config)), folder));
@@ -50,21 +56,7 @@ Result<std::unique_ptr<RenderedCell>> RenderedCell::Create() {
 int RenderedCell::width_px() const { return cell_->cell.config().rig.left.width_px; }
 int RenderedCell::height_px() const { return cell_->cell.config().rig.left.height_px; }
 int RenderedCell::view_count() const { return static_cast<int>(cell_->cell.config().views.size()); }
-int RenderedCell::pattern_count() const { return static_cast<int>(cell_->patterns.size()); }
-double RenderedCell::read_noise_dn() const { return cell_->cell.config().sensor.read_noise_dn; }
-double RenderedCell::gain_dn() const { return cell_->cell.config().sensor.gain_dn; }
-double RenderedCell::reference_degc() const { return cell_->cell.config().heat.reference_degc; }
 std::uint32_t RenderedCell::path_crc32() const { return PathCrc32(cell_->cell.config().views); }
-
-Result<SteelTable> RenderedCell::Steel() const {
-  SteelTable table;
-  for (double degc = kSteelFromDegc; degc <= kSteelToDegc; degc += kSteelStepDegc) {
-    ASSIGN_OR_RETURN(const double strain, ThermalStrain(degc));
-    table.degc.push_back(degc);
-    table.expansion.push_back(strain);
-  }
-  return table;
-}
 
 Result<const RenderedView*> RenderedCell::View(int part, int view) {
   if (const auto found = views_.find({part, view}); found != views_.end()) {

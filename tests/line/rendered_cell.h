@@ -22,30 +22,18 @@ struct RenderedView {
   std::array<std::vector<Image>, 2> images;  // left, right; by pattern
 };
 
-// Relative elongation of the part's steel, as a dilatometer would have measured it.
-struct SteelTable {
-  std::vector<double> degc;
-  std::vector<double> expansion;
-};
-
 class RenderedCell {
  public:
-  // Writes the files of the station, the model bundle among them, into a new folder, which goes with the
-  // object. Cost: about 5 s. Errors: those of the simulator.
+  // Makes the folder of the station stations/virtual as a run of it would have, model bundle included; it
+  // goes with the object. Cost: about 5 s. Errors: kIo, and those of the simulator.
   static Result<std::unique_ptr<RenderedCell>> Create();
   ~RenderedCell();
 
   const std::filesystem::path& folder() const { return folder_; }
-  std::string model_path() const { return folder_ / "model" / "axle.fsm"; }
   int width_px() const;
   int height_px() const;
   int view_count() const;
-  int pattern_count() const;
-  double read_noise_dn() const;
-  double gain_dn() const;
-  double reference_degc() const;
   std::uint32_t path_crc32() const;
-  Result<SteelTable> Steel() const;
 
   // Renders at the first call; parts from 1. Errors: those of the simulator.
   Result<const RenderedView*> View(int part, int view);

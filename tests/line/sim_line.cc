@@ -11,13 +11,11 @@
 namespace forgescan::testing {
 namespace {
 
-namespace fs = std::filesystem;
-
 constexpr std::int64_t kSecondUs = 1'000'000;
 constexpr std::int64_t kPartPatienceUs = 70 * kSecondUs;  // takt 45 s, then what a lossy bus adds
 constexpr std::int64_t kDispatchUs = 5'000;
+constexpr int kEveryNthPoint = 2;                                   // published, of a sixteenth of the pixels
 constexpr std::int64_t kCameraClockUs[2] = {7'654'321, 1'234'567};  // ahead of the station's
-constexpr double kRoundingDn = 0.29;                                // standard deviation of whole grey values
 
 RobotSimConfig RobotOf(const RenderedCell& cell) {
   RobotSimConfig config;
@@ -32,32 +30,16 @@ LineSimConfig LineOf(int parts) {
   return config;
 }
 
-RobotConfig RobotServiceOf(const RenderedCell& cell) {
-  RobotConfig config;
-  config.path_crc32 = cell.path_crc32();
-  return config;
-}
-
-ReconstructionServiceConfig ReconstructionOf(const RenderedCell& cell) {
-  ReconstructionServiceConfig config;
-  config.reconstruction.noise = {std::hypot(cell.read_noise_dn(), kRoundingDn), cell.gain_dn()};
-  config.publish_every_nth_point = 2;  // of a sixteenth of the pixels
-  return config;
-}
-
-// The start may be off by the scatter of the parts: 8 mm and 1.5 degrees on each axis.
-RegistrationConfig RegistrationOf() {
-  RegistrationConfig config;
-  config.icp.start_translation_mm = 16;
-  return config;
-}
-
 }  // namespace
 
 Result<std::unique_ptr<SimLine>> SimLine::Create(RenderedCell& cell, int parts) {
   std::unique_ptr<SimLine> line(new SimLine(cell, parts));
-  RETURN_IF_ERROR(line->MakeServices());
-  RETURN_IF_ERROR(line->MakeComputeServices());
+  ASSIGN_OR_RETURN(const Station station, Station::Load(cell.folder().string()));
+  RETURN_IF_ERROR(line->MakeCellServices(station));
+  RETURN_IF_ERROR(line->MakeCamera(station, 0));
+  RETURN_IF_ERROR(line->MakeCamera(station, 1));
+  RETURN_IF_ERROR(line->MakeViewServices(station));
+  RETURN_IF_ERROR(line->MakePartServices(station));
   line->Observe();
   return line;
 }
@@ -78,59 +60,67 @@ SimLine::SimLine(RenderedCell& cell, int parts) : cell_(cell), robot_(RobotOf(ce
   });
 }
 
-Status SimLine::MakeServices() {
-  TriggerConfig trigger;
-  trigger.patterns = cell_.pattern_count();
-  RETURN_IF_ERROR(trigger.Check());
-  const auto at = [this](const char* name) -> Host& { return *hosts_.at(name); };
-  robot_service_ = std::make_unique<RobotService>(
-      at("robot").hub, at("robot").monitor, RobotService::Devices{robot_, line_}, RobotServiceOf(cell_));
+Status SimLine::MakeCellServices(const Station& station) {
+  ASSIGN_OR_RETURN(const auto robot, RobotConfig::Load(station.file.Table("robot")));
+  ASSIGN_OR_RETURN(const auto trigger, TriggerConfig::Load(station.file.Table("trigger")));
+  ASSIGN_OR_RETURN(const auto cooling, CoolingConfig::Load(station.file.Table("cooling")));
+  robot_service_ = std::make_unique<RobotService>(At("robot").hub, At("robot").monitor,
+                                                  RobotService::Devices{robot_, line_}, robot);
   trigger_service_ =
-      std::make_unique<TriggerService>(at("trigger").hub, at("trigger").monitor, trigger_, trigger);
+      std::make_unique<TriggerService>(At("trigger").hub, At("trigger").monitor, trigger_, trigger);
   cooling_service_ =
-      std::make_unique<CoolingService>(at("cooling").hub, at("cooling").monitor, cooling_, CoolingConfig{});
-  for (const std::size_t side : {0u, 1u}) {
-    Host& host = at(side == 0 ? "camera_left" : "camera_right");
-    camera_services_[side] = std::make_unique<CameraService>(
-        host.hub, host.monitor, *cameras_[side], CameraConfig{},
-        side == 0 ? fsmsg::exposure_t::CAMERA_LEFT : fsmsg::exposure_t::CAMERA_RIGHT);
-    host.bus.Every(kDispatchUs, [camera = cameras_[side].get()] { camera->Dispatch(); });
-  }
+      std::make_unique<CoolingService>(At("cooling").hub, At("cooling").monitor, cooling_, cooling);
   return {};
 }
 
-Status SimLine::MakeComputeServices() {
-  const auto at = [this](const char* name) -> Host& { return *hosts_.at(name); };
-  const fs::path folder = cell_.folder();
-  ASSIGN_OR_RETURN(PatternSet pattern, LoadPatternSet(folder / "pattern.toml"));
-  ASSIGN_OR_RETURN(StereoCalibration calibration,
-                   LoadStereoCalibration((folder / "calibration" / "stereo.yaml").string()));
-  reconstruction_service_ = std::make_unique<ReconstructionService>(
-      at("reconstruction").hub, at("reconstruction").monitor, ReconstructionOf(cell_), std::move(pattern),
-      std::move(calibration));
-  ASSIGN_OR_RETURN(const SteelTable steel, cell_.Steel());
-  FusionConfig fusion;
-  fusion.reference_temperature_degc = cell_.reference_degc();
-  ASSIGN_OR_RETURN(ExpansionCurve curve, ExpansionCurve::Create(steel.degc, steel.expansion));
-  ASSIGN_OR_RETURN(ViewMatrices matrices, ViewMatrices::Load((folder / "views" / "views.toml").string()));
-  fusion_service_ = std::make_unique<FusionService>(at("fusion").hub, at("fusion").monitor, fusion,
+Status SimLine::MakeCamera(const Station& station, std::size_t side) {
+  const std::string name = side == 0 ? "left" : "right";
+  ASSIGN_OR_RETURN(const CameraConfig config, CameraConfig::Load(station.file.Table("camera"), name));
+  Host& host = *hosts_.at("camera_" + name);
+  camera_services_[side] = std::make_unique<CameraService>(
+      host.hub, host.monitor, *cameras_[side], config,
+      side == 0 ? fsmsg::exposure_t::CAMERA_LEFT : fsmsg::exposure_t::CAMERA_RIGHT);
+  host.bus.Every(kDispatchUs, [camera = cameras_[side].get()] { camera->Dispatch(); });
+  return {};
+}
+
+Status SimLine::MakeViewServices(const Station& station) {
+  ASSIGN_OR_RETURN(auto reconstruction,
+                   ReconstructionServiceConfig::Load(station.file.Table("reconstruction")));
+  reconstruction.publish_every_nth_point = kEveryNthPoint;
+  ASSIGN_OR_RETURN(PatternSet pattern, LoadPatternSet(station.pattern));
+  ASSIGN_OR_RETURN(StereoCalibration calibration, LoadStereoCalibration(station.calibration));
+  reconstruction_service_ =
+      std::make_unique<ReconstructionService>(At("reconstruction").hub, At("reconstruction").monitor,
+                                              reconstruction, std::move(pattern), std::move(calibration));
+  ASSIGN_OR_RETURN(FusionConfig fusion, FusionConfig::Load(station.file.Table("fusion")));
+  ASSIGN_OR_RETURN(ExpansionCurve curve, ExpansionCurve::Create(fusion.expansion_degc, fusion.expansion));
+  ASSIGN_OR_RETURN(ViewMatrices matrices, ViewMatrices::Load(station.views));
+  fusion_service_ = std::make_unique<FusionService>(At("fusion").hub, At("fusion").monitor, std::move(fusion),
                                                     std::move(matrices), std::move(curve));
-  ASSIGN_OR_RETURN(const ModelBundle bundle, ReadBundle(cell_.model_path()));
+  return {};
+}
+
+Status SimLine::MakePartServices(const Station& station) {
+  ASSIGN_OR_RETURN(RegistrationConfig registration,
+                   RegistrationConfig::Load(station.file.Table("registration")));
+  ASSIGN_OR_RETURN(const ModelBundle bundle, ReadBundle(station.model));
   ASSIGN_OR_RETURN(RegistrationModel model, RegistrationModel::Build(bundle));
   registration_service_ = std::make_unique<RegistrationService>(
-      at("registration").hub, at("registration").monitor, RegistrationOf(), std::move(model));
-  const fs::path results = folder / "results";
+      At("registration").hub, At("registration").monitor, std::move(registration), std::move(model));
   std::error_code ignored;  // there may be none
-  fs::remove_all(results, ignored);
-  ASSIGN_OR_RETURN(evaluator_, ModelEvaluator::Load(cell_.model_path(), folder / "model" / "features.toml"));
-  ASSIGN_OR_RETURN(report_service_,
-                   ReportService::Create(at("report").hub, at("report").monitor, ReportConfig{},
-                                         {"line_test", "0", "0", results.string()}, *evaluator_));
+  std::filesystem::remove_all(station.results, ignored);
+  ASSIGN_OR_RETURN(const ReportConfig report, ReportConfig::Load(station.file.Table("report")));
+  ASSIGN_OR_RETURN(evaluator_, ModelEvaluator::Load(station.model, station.features));
+  ASSIGN_OR_RETURN(
+      report_service_,
+      ReportService::Create(At("report").hub, At("report").monitor, report,
+                            {station.name, "0", station.file.hash(), station.results}, *evaluator_));
   return {};
 }
 
 void SimLine::Observe() {
-  StreamHub& hub = hosts_.at("observer")->hub;
+  StreamHub& hub = At("observer").hub;
   hub.Subscribe<fsmsg::view_captured_t>(kViewCaptured, [this](const auto& m) { views_.push_back(m); });
   hub.Subscribe<fsmsg::scan_complete_t>(kScanComplete, [this](const auto& m) { scans_.push_back(m); });
   hub.Subscribe<fsmsg::verdict_t>(kVerdict, [this](const auto& m) { verdicts_.push_back(m); });
@@ -143,7 +133,7 @@ void SimLine::Observe() {
 
 void SimLine::Record(const char* channel) {
   const std::string name = channel;
-  hosts_.at("observer")->bus.Subscribe(name, [this, name](ByteView message) {
+  At("observer").bus.Subscribe(name, [this, name](ByteView message) {
     published_.emplace_back(name.begin(), name.end());
     published_.emplace_back(message.begin(), message.end());
   });

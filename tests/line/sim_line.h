@@ -3,6 +3,7 @@
 // edges of the simulated trigger. Public headers of the simulator stay out of here, see rendered_cell.h.
 #pragma once
 
+#include <array>
 #include <map>
 #include <memory>
 #include <optional>
@@ -16,6 +17,7 @@
 #include "drivers/trigger/trigger_sim.h"
 #include "services/camera/camera_service.h"
 #include "services/common/bus/sim_bus.h"
+#include "services/common/service/station.h"
 #include "services/cooling/cooling_service.h"
 #include "services/fusion/fusion_service.h"
 #include "services/reconstruction/reconstruction_service.h"
@@ -47,8 +49,9 @@ struct LostFrame {
 
 class SimLine {
  public:
-  // `cell` outlives the line. The results go into its folder; those of an earlier line are removed.
-  // Errors: those of the services' configurations and files.
+  // The services as their programs make them from the station's folder, which `cell` has made; it outlives
+  // the line. Results of an earlier line are removed. Errors: those of the services' configurations and
+  // files.
   static Result<std::unique_ptr<SimLine>> Create(RenderedCell& cell, int parts);
 
   void SetBusFaults(const SimFaults& faults) { network_.SetFaults(faults); }
@@ -74,9 +77,12 @@ class SimLine {
   std::int64_t Total(const std::string& counter) const;
 
  private:
-  explicit SimLine(RenderedCell& cell, int parts);
-  Status MakeServices();
-  Status MakeComputeServices();
+  SimLine(RenderedCell& cell, int parts);
+  Host& At(const char* name) { return *hosts_.at(name); }
+  Status MakeCellServices(const Station& station);
+  Status MakeCamera(const Station& station, std::size_t side);
+  Status MakeViewServices(const Station& station);
+  Status MakePartServices(const Station& station);
   void Observe();
   void Record(const char* channel);
   void Expose(const TriggerSim::Edge& edge);
