@@ -1,7 +1,9 @@
 #include "services/reconstruction/phase_estimator.h"
 
 #include <Eigen/QR>
+#include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace forgescan {
 namespace {
@@ -41,6 +43,18 @@ std::vector<double> FusionWeights(const PhaseEstimator& estimator, const Pattern
 
 double PhaseEstimator::PhaseNoise(int frequency) const {
   return std::sqrt((cosine.row(frequency).squaredNorm() + sine.row(frequency).squaredNorm()) / 2);
+}
+
+double PhaseEstimator::WhiteNoise(int frequency, double contrast) const {
+  constexpr int kPhases = 64;
+  double worst = 0;
+  for (int k = 0; k < kPhases; ++k) {
+    const double phase = 2 * std::numbers::pi * k / kPhases;
+    const Eigen::RowVectorXd modulation =
+        std::cos(phase) * cosine.row(frequency) + std::sin(phase) * sine.row(frequency);
+    worst = std::max(worst, (background.row(frequency) + modulation / contrast).norm());
+  }
+  return worst;
 }
 
 Result<PhaseEstimator> MakePhaseEstimator(const PatternSet& pattern) {

@@ -26,6 +26,9 @@ struct PhaseEstimator {
   // Standard deviation of a phase over sigma / B (sigma of a grey value), averaged over all phases: 0.71 for
   // 4 own frames, 1.0 and 1.22 for 3-2-2 shared ones.
   double PhaseNoise(int frequency) const;
+  // Standard deviation of A + B / contrast, what the reference frame should show, over sigma, at the worst
+  // phase.
+  double WhiteNoise(int frequency, double contrast) const;
 };
 
 // Errors: kInvalidArgument from Check(pattern); kDegenerate when the shifts do not determine the phases.

@@ -39,6 +39,7 @@ StripDecoder::StripDecoder(const PatternSet& pattern, const ReconstructionConfig
   const int frames = pattern.frame_count();
   frames_.resize(static_cast<std::size_t>(frames));
   terms_.resize(static_cast<std::size_t>(frames));
+  reference_noise_ = static_cast<float>(estimator.WhiteNoise(0, pattern.reference_contrast));
   constexpr double kZero = 1e-12;  // weights that are 0 but for rounding
   for (int j = 0; j < static_cast<int>(pattern.frequencies.size()); ++j) {
     const auto at = static_cast<std::size_t>(j);
@@ -268,16 +269,14 @@ void StripDecoder::ClassifyReference() {
   const auto per_modulation = static_cast<float>(1 / pattern_.reference_contrast);
   const auto sigmas = static_cast<float>(config_.reference_tolerance_sigma);
   const auto part = static_cast<float>(config_.reference_tolerance_modulation);
+  const auto read_variance = static_cast<float>(config_.noise.read_noise_dn * config_.noise.read_noise_dn);
   const auto gain = static_cast<float>(config_.noise.gain_dn);
-  // Variance of A + B / m in units of one grey value's: 1.8 on average for a 3-2-2 set, 0.6 for 4-4-4.
-  constexpr float kPredictionVariance = 2;
   for (int x = 0; x < length; ++x) {
     const auto at = static_cast<std::size_t>(x);
     const float wanted = std::min(background_[0][at] + per_modulation * modulation_[0][at], 255.0f);
-    const float grey_variance = grey_sigma_[at] * grey_sigma_[at];
-    const float white_variance = grey_variance + gain * std::max(wanted - background_[0][at], 0.0f);
-    const float sigma = std::sqrt(white_variance + kPredictionVariance * grey_variance);
-    const float limit = std::max(sigmas * sigma, part * modulation_[0][at]);
+    const float wanted_sigma = reference_noise_ * grey_sigma_[at];
+    const float variance = wanted_sigma * wanted_sigma + read_variance + gain * std::max(wanted, 0.0f);
+    const float limit = std::max(sigmas * std::sqrt(variance), part * modulation_[0][at]);
     Mark(cause[at], std::abs(white[at] - wanted) > limit, MaskCause::kReference);
   }
 }

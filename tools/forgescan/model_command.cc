@@ -1,4 +1,5 @@
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 
 #include "services/common/model/bundle_file.h"
@@ -15,7 +16,10 @@ struct Arguments {
 
 Status Import(const Arguments& arguments) {
   ASSIGN_OR_RETURN(const ModelBundle bundle, LoadModel(arguments.file, arguments.import));
-  RETURN_IF_ERROR(WriteBundle(bundle, arguments.out));
+  const std::filesystem::path out = arguments.out.empty()
+                                        ? std::filesystem::path(arguments.file).replace_extension(".bundle")
+                                        : std::filesystem::path(arguments.out);
+  RETURN_IF_ERROR(WriteBundle(bundle, out));
   std::printf("%zu faces, %zu triangles, %zu samples, resolution %.3f mm, checksum %08x\n",
               bundle.faces.size(), bundle.triangles.size(), bundle.sample_points.size(), bundle.resolution_mm,
               bundle.checksum);
@@ -36,7 +40,7 @@ void AddModelCommand(CLI::App& app, Status& outcome) {
   command->require_subcommand(1);
   CLI::App* import = command->add_subcommand("import", "Turn a STEP, STL or PLY file into a model bundle");
   import->add_option("file", arguments->file, "design model: .step, .stp, .stl or .ply")->required();
-  import->add_option("--out", arguments->out, "the bundle to write")->required();
+  import->add_option("--out", arguments->out, "the bundle to write (default: beside the file)");
   import->add_option("--spacing-mm", arguments->import.spacing_mm, "of the surface samples")
       ->capture_default_str();
   import

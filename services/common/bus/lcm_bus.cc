@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <charconv>
 #include <ctime>
+#include <fstream>
 
 #include "services/common/bus/lcm_socket.h"
 
@@ -23,10 +24,28 @@ Result<int> PortOf(const std::string& url) {
     std::from_chars(url.data() + colon + 1, url.data() + url.size(), port);
   }
   if (port < 1 || port > 65535) {
-    return Fail(ErrorCode::kInvalidArgument,
-                "bus \"{}\" is not of the form udpm://GROUP:PORT?ttl=0&recv_buf_size=BYTES with a port of 1 to 65535", url);
+    return Fail(
+        ErrorCode::kInvalidArgument,
+        "bus \"{}\" is not of the form udpm://GROUP:PORT?ttl=0&recv_buf_size=BYTES with a port of 1 to 65535",
+        url);
   }
   return port;
+}
+
+// The URL with recv_buf_size no larger than the kernel allows: LCM would print a warning that names no
+// remedy, and what the socket got is read back and judged anyway.
+std::string WithAllowedBuffer(const std::string& url) {
+  static const std::string kKey = "recv_buf_size=";
+  const std::size_t at = url.find(kKey);
+  std::ifstream limit_file("/proc/sys/net/core/rmem_max");
+  std::int64_t limit = 0, wanted = 0;
+  if (at == std::string::npos || !(limit_file >> limit)) {
+    return url;
+  }
+  const char* begin = url.data() + at + kKey.size();
+  const char* end = std::from_chars(begin, url.data() + url.size(), wanted).ptr;
+  return url.substr(0, at + kKey.size()) + std::to_string(std::min(wanted, limit)) +
+         std::string(end, url.data() + url.size());
 }
 
 // LCM takes channel names as regular expressions.
@@ -47,16 +66,18 @@ struct LcmBus::Subscription {
   MessageHandler handler;
 
   static void OnMessage(const lcm_recv_buf_t* buffer, const char*, void* self) {
-    static_cast<Subscription*>(self)->handler(ByteView(static_cast<const std::uint8_t*>(buffer->data), buffer->data_size));
+    static_cast<Subscription*>(self)->handler(
+        ByteView(static_cast<const std::uint8_t*>(buffer->data), buffer->data_size));
   }
 };
 
 Result<std::unique_ptr<LcmBus>> LcmBus::Open(const std::string& url) {
   ASSIGN_OR_RETURN(const int port, PortOf(url));
-  lcm_t* lcm = lcm_create(url.c_str());
+  lcm_t* lcm = lcm_create(WithAllowedBuffer(url).c_str());
   if (lcm == nullptr) {
     return Fail(ErrorCode::kUnavailable,
-                "bus {}: cannot be opened; is there a multicast route? (ip route add 239.255.76.67/32 dev lo, or run it under "
+                "bus {}: cannot be opened; is there a multicast route? (ip route add 239.255.76.67/32 dev "
+                "lo, or run it under "
                 "tools/with-network)",
                 url);
   }
@@ -65,7 +86,8 @@ Result<std::unique_ptr<LcmBus>> LcmBus::Open(const std::string& url) {
 
 LcmBus::LcmBus(_lcm_t* lcm, int port) : lcm_(lcm) {
   // LCM opens its receiving socket with the first subscription.
-  lcm_subscription_t* probe = lcm_subscribe(lcm_, "FORGESCAN_PROBE", [](const lcm_recv_buf_t*, const char*, void*) {}, nullptr);
+  lcm_subscription_t* probe = lcm_subscribe(
+      lcm_, "FORGESCAN_PROBE", [](const lcm_recv_buf_t*, const char*, void*) {}, nullptr);
   if (const auto socket = FindLcmSocket(port); socket.ok()) {
     socket_inode_ = socket->inode;
     receive_buffer_bytes_ = socket->receive_buffer_bytes;
@@ -86,11 +108,15 @@ Status LcmBus::Publish(std::string_view channel, ByteView message) {
 
 void LcmBus::Subscribe(const std::string& channel, MessageHandler handler) {
   auto& held = subscriptions_.emplace_back(std::make_unique<Subscription>(Subscription{std::move(handler)}));
-  lcm_subscription_t* subscription = lcm_subscribe(lcm_, Escaped(channel).c_str(), &Subscription::OnMessage, held.get());
-  lcm_subscription_set_queue_capacity(subscription, 0);  // unlimited: LCM's default drops the newest in silence
+  lcm_subscription_t* subscription =
+      lcm_subscribe(lcm_, Escaped(channel).c_str(), &Subscription::OnMessage, held.get());
+  lcm_subscription_set_queue_capacity(subscription,
+                                      0);  // unlimited: LCM's default drops the newest in silence
 }
 
-Bus::TimerId LcmBus::At(std::int64_t utime, TimerHandler handler) { return timers_.Add(utime, 0, std::move(handler)); }
+Bus::TimerId LcmBus::At(std::int64_t utime, TimerHandler handler) {
+  return timers_.Add(utime, 0, std::move(handler));
+}
 
 Bus::TimerId LcmBus::Every(std::int64_t period_us, TimerHandler handler) {
   return timers_.Add(NowUs() + period_us, period_us, std::move(handler));

@@ -10,16 +10,25 @@
 namespace forgescan {
 namespace {
 
-// A sender that claims more than this behind what was delivered is not believed: it would cost unbounded memory.
+// A sender that claims more than this behind what was delivered is not believed: it would cost unbounded
+// memory.
 constexpr std::int64_t kMaxWaiting = 100'000;
 constexpr std::size_t kMaxPiecesAsked = 2000;
 
 }  // namespace
 
-StreamReceiver::StreamReceiver(Bus& bus, std::string channel, const StreamOptions& options, StreamCounters& counters)
-    : bus_(bus), channel_(std::move(channel)), options_(options), counters_(counters), subscribed_us_(bus.NowUs()) {}
+StreamReceiver::StreamReceiver(Bus& bus, std::string channel, const StreamOptions& options,
+                               StreamCounters& counters)
+    : bus_(bus),
+      channel_(std::move(channel)),
+      options_(options),
+      counters_(counters),
+      subscribed_us_(bus.NowUs()) {}
 
 bool StreamReceiver::EnterSession(std::int64_t session, std::int64_t first_sequence_if_joining) {
+  if (session >= session_) {
+    heard_us_ = bus_.NowUs();
+  }
   if (session == session_) {
     return true;
   }
@@ -85,13 +94,15 @@ void StreamReceiver::Complete(Waiting& waiting, ByteView bytes) {
 
 void StreamReceiver::OnPiece(const fsmsg::resend_piece_t& piece) {
   const auto found = waiting_.find(piece.sequence);
-  const bool sane = piece.message_bytes > 0 && static_cast<std::size_t>(piece.message_bytes) <= kMaxMessageBytes &&
-                    piece.piece_bytes > 0 && piece.piece >= 0 && piece.piece <= piece.message_bytes / piece.piece_bytes;
+  const bool sane =
+      piece.message_bytes > 0 && static_cast<std::size_t>(piece.message_bytes) <= kMaxMessageBytes &&
+      piece.piece_bytes > 0 && piece.piece >= 0 && piece.piece <= piece.message_bytes / piece.piece_bytes;
   if (piece.session != session_ || found == waiting_.end() || found->second.complete || !sane) {
     return;
   }
   Waiting& waiting = found->second;
-  const auto bytes = static_cast<std::size_t>(piece.message_bytes), size = static_cast<std::size_t>(piece.piece_bytes);
+  const auto bytes = static_cast<std::size_t>(piece.message_bytes),
+             size = static_cast<std::size_t>(piece.piece_bytes);
   const std::size_t count = (bytes + size - 1) / size, index = static_cast<std::size_t>(piece.piece);
   if (waiting.pieces.size() != count || waiting.bytes.size() != bytes) {
     waiting.bytes.assign(bytes, 0);
@@ -158,34 +169,43 @@ void StreamReceiver::GiveUp(std::int64_t before) {
   DeliverReady();
 }
 
-void StreamReceiver::OnTimer() {
+bool StreamReceiver::IsOverdue(const Waiting& waiting) const {
   const std::int64_t now_us = bus_.NowUs();
+  const bool fruitless = waiting.first_asked_us != 0 &&
+                         now_us - std::max(waiting.first_asked_us, waiting.since_us) > options_.give_up_us;
+  return fruitless || now_us - heard_us_ > options_.give_up_us;
+}
+
+void StreamReceiver::OnTimer() {
   std::int64_t give_up_before = next_;
   int open = 0;
   for (auto& [sequence, waiting] : waiting_) {
     if (waiting.complete) {
       continue;
     }
-    if (now_us - waiting.since_us > options_.give_up_us) {
+    if (IsOverdue(waiting)) {
       give_up_before = sequence + 1;
-      continue;
-    }
-    if (++open > options_.requests_at_once) {
+    } else if (++open > options_.requests_at_once) {
       break;
-    }
-    const bool first_time = waiting.asked_us == 0 && now_us - waiting.since_us >= options_.request_after_us;
-    const bool again = waiting.asked_us != 0 && now_us - std::max(waiting.asked_us, waiting.since_us) >= options_.request_period_us;
-    if (first_time || again) {
-      waiting.asked_us = now_us;
-      Ask(sequence, waiting);
+    } else {
+      AskIfDue(sequence, waiting);
     }
   }
   GiveUp(give_up_before);
 }
 
-void StreamReceiver::Ask(std::int64_t sequence, Waiting& waiting) {
+void StreamReceiver::AskIfDue(std::int64_t sequence, Waiting& waiting) {
+  const std::int64_t now_us = bus_.NowUs();
+  const bool first_time = waiting.asked_us == 0 && now_us - waiting.since_us >= options_.request_after_us;
+  const bool again = waiting.asked_us != 0 &&
+                     now_us - std::max(waiting.asked_us, waiting.since_us) >= options_.request_period_us;
+  if (!first_time && !again) {
+    return;
+  }
+  waiting.asked_us = now_us;
+  waiting.first_asked_us = first_time ? now_us : waiting.first_asked_us;
   fsmsg::resend_request_t request{};
-  request.utime = bus_.NowUs();
+  request.utime = now_us;
   request.channel = channel_;
   request.session = session_;
   request.sequence = sequence;

@@ -1,9 +1,10 @@
-// The receiving half of the resend protocol for one channel: delivers every message once, whole and in order, asks for what
-// is missing, and after a bounded time gives up and says so.
+// The receiving half of the resend protocol for one channel: delivers every message once, whole and in order,
+// asks for what is missing, and after a bounded time gives up and says so.
 //
 //          first contact             gap seen                 pieces or message come
 //   idle ----------------> in order ----------> waiting ------------------------------> in order
-//                                                 | no progress for give_up_us, or the sender no longer has it
+//                                                 | asked for without progress for give_up_us, the sender
+//                                                 silent as | long, or the sender no longer has it
 //                                                 +-----------> lost handler, then in order behind the hole
 #pragma once
 
@@ -39,13 +40,14 @@ class StreamReceiver {
  private:
   // A message from `next_` on that has not been delivered.
   struct Waiting {
-    Bytes bytes;                // whole message, or room for its pieces
+    Bytes bytes;  // whole message, or room for its pieces
     bool complete = false;
-    bool resent = false;        // pieces of it have come
-    std::vector<bool> pieces;   // which have come; empty = none
+    bool resent = false;       // pieces of it have come
+    std::vector<bool> pieces;  // which have come; empty = none
     std::size_t pieces_open = 0;
-    std::int64_t since_us = 0;  // noticed missing, or last progress
-    std::int64_t asked_us = 0;  // 0 = not yet
+    std::int64_t since_us = 0;        // noticed missing, or last progress
+    std::int64_t first_asked_us = 0;  // 0 = not yet: its turn comes when older ones have arrived
+    std::int64_t asked_us = 0;        // the last time
   };
 
   // False: the bytes belong to an older session.
@@ -54,7 +56,8 @@ class StreamReceiver {
   void Complete(Waiting& waiting, ByteView bytes);
   void DeliverReady();
   void GiveUp(std::int64_t before);
-  void Ask(std::int64_t sequence, Waiting& waiting);
+  bool IsOverdue(const Waiting& waiting) const;
+  void AskIfDue(std::int64_t sequence, Waiting& waiting);
 
   Bus& bus_;
   std::string channel_;
@@ -63,8 +66,9 @@ class StreamReceiver {
   Handler handler_;
   LostHandler lost_handler_;
   std::int64_t subscribed_us_;
-  std::int64_t session_ = 0;  // 0 = no contact yet
-  std::int64_t next_ = 1;     // sequence to be delivered next
+  std::int64_t session_ = 0;   // 0 = no contact yet
+  std::int64_t next_ = 1;      // sequence to be delivered next
+  std::int64_t heard_us_ = 0;  // last sign of life of the sender
   std::map<std::int64_t, Waiting> waiting_;
 };
 

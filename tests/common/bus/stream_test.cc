@@ -118,6 +118,22 @@ TEST(Stream, GivesUpInBoundedTimeSaysSoAndGoesOn) {
   EXPECT_EQ(receiver.counters().missing, 1);
 }
 
+TEST(Stream, ABacklogLongerThanTheGiveUpTimeIsCarriedToTheEnd) {
+  constexpr int kMessages = 40;
+  SimNetwork network(3);
+  StreamHub receiver(network.AddNode(), "receiver");
+  Received received;
+  received.Listen(receiver);
+  // 40 messages of 20 pieces, 50 ms a piece: 40 s of resends, four times the give-up time.
+  StreamHub sender(network.AddNode(), "sender", {.piece_bytes = 5'000, .piece_gap_us = 50'000});
+  network.SetFaults({.large_loss = 1.0});
+  for (int i = 1; i <= kMessages; ++i) {
+    ASSERT_TRUE(sender.Publish(kFrameLeft, Frame(i, 100'000)).ok());
+  }
+  EXPECT_TRUE(network.RunUntilTrue([&] { return received.ids.size() == kMessages; }, 2 * kMinuteUs));
+  EXPECT_EQ(received.lost, 0);
+}
+
 TEST(Stream, WhatTheSenderNoLongerKeepsIsGivenUpAtOnce) {
   SimNetwork network;
   StreamHub receiver(network.AddNode(), "receiver");

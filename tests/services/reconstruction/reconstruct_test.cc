@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstring>
 #include <opencv2/calib3d.hpp>
+#include <opencv2/core.hpp>
 #include <opencv2/core/eigen.hpp>
 
 #include "tests/services/reconstruction/fringe_scene.h"
@@ -87,6 +88,27 @@ TEST(Reconstruct, StartsOnAPlaneOfKnownPlace) {
     EXPECT_LT(std::abs(errors.mean_mm), 0.003);
     EXPECT_LT(errors.worst_normal_deg, 5);
   }
+}
+
+// What the reference frame should show is made of noisy frames itself.
+TEST(Reconstruct, NoiseOfTheKnownSizeIsNoContradictionToTheReferenceFrame) {
+  constexpr double kNoiseDn = 1.5;
+  PatternSet pattern = SmallPattern(Background::kShared);
+  auto frames = Render(Plane(kNormal, kOffsetMm), SmallRig(), pattern, {.noise_dn = kNoiseDn});
+  pattern.reference_frame_index = pattern.frame_count();
+  pattern.frame_names.push_back("white");
+  cv::RNG random(3);
+  for (auto* camera : {&frames.left, &frames.right}) {
+    cv::Mat white(camera->front().size(), CV_32F);
+    random.fill(white, cv::RNG::NORMAL, 110 + 80, kNoiseDn);  // A + B of the scene
+    white.convertTo(camera->emplace_back(), CV_8U);
+  }
+  const auto result = Reconstruct(frames.left, frames.right, pattern, SmallRig(), SmallConfig(kNoiseDn));
+  ASSERT_TRUE(result.ok()) << result.error().message;
+  const auto& pixels = result->quality.left.pixels;
+  // 5 sigma: none of 76,800 pixels by noise; a few at the ends of the projector's field.
+  EXPECT_LT(pixels[static_cast<std::size_t>(MaskCause::kReference)], 8);
+  EXPECT_GT(result->cloud_in_camera.size(), 30000U);
 }
 
 TEST(Reconstruct, PredictsItsOwnNoise) {

@@ -124,6 +124,13 @@ Result<std::vector<fsmsg::verdict_t>> InspectParts(StationRunner& runner, Proces
   StreamHub hub(runner.bus(), "inspect");
   const Progress progress(hub);
   const Interrupt interrupt;
+  if (const int bytes = runner.bus().Health().receive_buffer_bytes; bytes < kWantedReceiveBufferBytes) {
+    fmt::print(
+        "note: the bus has receive buffers of {:.1f} MB, {:.0f} MB are wanted; what is lost is sent again "
+        "(sysctl "
+        "net.core.rmem_max={} avoids it)\n",
+        bytes * 1e-6, kWantedReceiveBufferBytes * 1e-6, kWantedReceiveBufferBytes / 2);
+  }
   RETURN_IF_ERROR(
       cell.Start("virtual_station",
                  {ProgramFolder() + "/forgescan-virtual-station", "run", "--run", run.string(), "--parts",

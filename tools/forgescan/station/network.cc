@@ -2,6 +2,8 @@
 
 #include <arpa/inet.h>
 #include <fcntl.h>
+#include <linux/netlink.h>
+#include <linux/rtnetlink.h>
 #include <net/if.h>
 #include <net/route.h>
 #include <sched.h>
@@ -9,6 +11,8 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
@@ -26,6 +30,55 @@ class Socket {
   Socket(const Socket&) = delete;
   Socket& operator=(const Socket&) = delete;
   int fd() const { return fd_; }
+
+ private:
+  int fd_;
+};
+
+// Asks the kernel by which device it would send; the address a socket gets does not tell, as loopback may
+// lend another's.
+class Netlink {
+ public:
+  Netlink() : fd_(socket(AF_NETLINK, SOCK_RAW | SOCK_CLOEXEC, NETLINK_ROUTE)) {}
+  ~Netlink() { close(fd_); }
+  Netlink(const Netlink&) = delete;
+  Netlink& operator=(const Netlink&) = delete;
+
+  bool AskRouteTo(in_addr to) const {
+    struct {
+      nlmsghdr header;
+      rtmsg route;
+      rtattr attribute;
+      in_addr address;
+    } request{};
+    request.header.nlmsg_len = sizeof request;
+    request.header.nlmsg_type = RTM_GETROUTE;
+    request.header.nlmsg_flags = NLM_F_REQUEST;
+    request.route.rtm_family = AF_INET;
+    request.route.rtm_dst_len = 32;
+    request.attribute.rta_type = RTA_DST;
+    request.attribute.rta_len = RTA_LENGTH(sizeof to);
+    request.address = to;
+    return send(fd_, &request, sizeof request, 0) == static_cast<ssize_t>(sizeof request);
+  }
+  // Index of the output device; 0 = there is no route.
+  int AnsweredDevice() const {
+    alignas(nlmsghdr) std::array<char, 4096> buffer{};
+    auto length = static_cast<unsigned>(std::max<ssize_t>(0, recv(fd_, buffer.data(), buffer.size(), 0)));
+    auto* header = reinterpret_cast<nlmsghdr*>(buffer.data());
+    if (!NLMSG_OK(header, length) || header->nlmsg_type != RTM_NEWROUTE) {
+      return 0;
+    }
+    auto rest = static_cast<unsigned>(RTM_PAYLOAD(header));
+    for (auto* entry = RTM_RTA(NLMSG_DATA(header)); RTA_OK(entry, rest); entry = RTA_NEXT(entry, rest)) {
+      if (entry->rta_type == RTA_OIF) {
+        int device = 0;
+        std::memcpy(&device, RTA_DATA(entry), sizeof device);
+        return device;
+      }
+    }
+    return 0;
+  }
 
  private:
   int fd_;
@@ -74,13 +127,11 @@ Status MapUser(uid_t uid, gid_t gid) {
 }  // namespace
 
 bool HasMulticastRoute() {
-  const Socket socket;
-  const sockaddr_in to = Address(kGroups[0]);
-  sockaddr_in from{};
-  socklen_t length = sizeof from;
-  return connect(socket.fd(), reinterpret_cast<const sockaddr*>(&to), sizeof to) == 0 &&
-         getsockname(socket.fd(), reinterpret_cast<sockaddr*>(&from), &length) == 0 &&
-         from.sin_addr.s_addr == htonl(INADDR_LOOPBACK);
+  const Netlink netlink;
+  if (!netlink.AskRouteTo(Address(kGroups[0]).sin_addr)) {
+    return false;
+  }
+  return netlink.AnsweredDevice() == static_cast<int>(if_nametoindex("lo"));
 }
 
 Status EnterPrivateNetwork() {

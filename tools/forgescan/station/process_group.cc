@@ -2,7 +2,7 @@
 
 #include <fcntl.h>
 #include <poll.h>
-#include <spawn.h>
+#include <sys/prctl.h>
 #include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -31,36 +31,43 @@ std::string LastLine(const std::string& path) {
   return last;
 }
 
-}  // namespace
-
-Status ProcessGroup::Start(const std::string& name, const std::vector<std::string>& command) {
-  std::filesystem::create_directories(log_folder_);
-  const std::string log = log_folder_ + "/" + name + ".log";
+// In the child: never returns. The tool has one thread, so any call is safe between fork and exec.
+[[noreturn]] void Become(const std::vector<std::string>& command, int log) {
   std::vector<char*> arguments;
   for (const std::string& word : command) {
     arguments.push_back(const_cast<char*>(word.c_str()));
   }
   arguments.push_back(nullptr);
-  posix_spawn_file_actions_t files;
-  posix_spawn_file_actions_init(&files);
-  posix_spawn_file_actions_addopen(&files, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
-  posix_spawn_file_actions_addopen(&files, STDOUT_FILENO, log.c_str(), O_WRONLY | O_CREAT | O_APPEND, 0644);
-  posix_spawn_file_actions_adddup2(&files, STDOUT_FILENO, STDERR_FILENO);
-  posix_spawnattr_t
-      attributes;  // a group of its own: Ctrl-C reaches the tool, and the tool stops the services in order
-  posix_spawnattr_init(&attributes);
+  prctl(PR_SET_PDEATHSIG, SIGTERM);  // a tool that is killed leaves no services behind
+  setpgid(0, 0);                     // Ctrl-C reaches the tool, and the tool stops the services in order
   sigset_t none;
   sigemptyset(&none);
-  posix_spawnattr_setsigmask(&attributes, &none);
-  posix_spawnattr_setpgroup(&attributes, 0);
-  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP | POSIX_SPAWN_SETSIGMASK);
-  pid_t pid = 0;
-  const int outcome = posix_spawn(&pid, arguments[0], &files, &attributes, arguments.data(), environ);
-  posix_spawn_file_actions_destroy(&files);
-  posix_spawnattr_destroy(&attributes);
-  if (outcome != 0) {
-    return Fail(ErrorCode::kIo, "{} cannot be started with its log in {}: {}", command[0], log,
-                std::strerror(outcome));
+  sigprocmask(SIG_SETMASK, &none, nullptr);
+  dup2(open("/dev/null", O_RDONLY), STDIN_FILENO);
+  dup2(log, STDOUT_FILENO);
+  dup2(log, STDERR_FILENO);
+  execv(arguments[0], arguments.data());
+  _exit(127);
+}
+
+}  // namespace
+
+Status ProcessGroup::Start(const std::string& name, const std::vector<std::string>& command) {
+  std::error_code problem;
+  std::filesystem::create_directories(log_folder_, problem);
+  const int log = open(LogOf(name).c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
+  if (log < 0 || access(command[0].c_str(), X_OK) != 0) {
+    close(log);
+    return Fail(ErrorCode::kIo, "{} cannot be started with its log in {}: {}", command[0], LogOf(name),
+                std::strerror(errno));
+  }
+  const pid_t pid = fork();
+  if (pid == 0) {
+    Become(command, log);
+  }
+  close(log);
+  if (pid < 0) {
+    return Fail(ErrorCode::kIo, "{} cannot be started: {}", command[0], std::strerror(errno));
   }
   processes_.push_back({name, pid});
   return {};
@@ -71,7 +78,7 @@ std::string ProcessGroup::Ended() {
     int status = 0;
     if (waitpid(process->pid, &status, WNOHANG) == process->pid) {
       const std::string text =
-          fmt::format("{} {}; see {}/{}.log", process->name, Fate(status), log_folder_, process->name);
+          fmt::format("{} {}: {}", process->name, Fate(status), LastLine(LogOf(process->name)));
       processes_.erase(process);
       return text;
     }
@@ -87,7 +94,7 @@ Status ProcessGroup::WaitForSuccess() {
     processes_.pop_back();
     if (status != 0) {
       return Fail(ErrorCode::kUnavailable, "{} {}: {}", process.name, Fate(status),
-                  LastLine(fmt::format("{}/{}.log", log_folder_, process.name)));
+                  LastLine(LogOf(process.name)));
     }
   }
   return {};

@@ -20,7 +20,7 @@ class ProcessGroup {
 
   // Errors: kIo (no such program, no log file).
   Status Start(const std::string& name, const std::vector<std::string>& command);
-  // Name and fate of the first process that has ended since the last call; empty = all run.
+  // Name, fate and last words of the first process that has ended since the last call; empty = all run.
   std::string Ended();
   // Waits for all to end by themselves. Errors: kUnavailable (one failed; the end of its log is in the
   // sentence).
@@ -36,6 +36,7 @@ class ProcessGroup {
     pid_t pid;
   };
   static bool WaitForEnd(pid_t pid);
+  std::string LogOf(const std::string& name) const { return log_folder_ + "/" + name + ".log"; }
 
   std::string log_folder_;
   std::vector<Process> processes_;

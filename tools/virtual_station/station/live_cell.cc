@@ -35,6 +35,7 @@ RobotSimConfig RobotOf(const CellConfig& config) {
   RobotSimConfig robot;
   robot.view_count = static_cast<std::uint16_t>(config.views.size());
   robot.path_crc32 = PathCrc32(config.views);
+  robot.move_timeout_ms = 30'000;  // a picture may be late on a small machine; the arm is held for it
   return robot;
 }
 
@@ -139,6 +140,7 @@ void LiveCell::FollowRobot(std::int64_t elapsed_us) {
   robot_.SetFaults({.stuck = rendered == nullptr});
   if (rendered == nullptr && robot_.progress() >= 1.0) {
     held_us_ += elapsed_us;
+    line_held_us_ += elapsed_us;
   }
 }
 
@@ -186,7 +188,7 @@ Status LiveCell::Step() {
   cooling_node_.Step(now_us_);
   line_node_.StepWire(now_us_);
   if (line_started_) {
-    line_.Step(now_us_);
+    line_.Step(now_us_ - line_held_us_);  // no part leaves, and none comes, while the picture is awaited
     FollowLine();
   }
   FollowRobot(now_us_ - before_us);

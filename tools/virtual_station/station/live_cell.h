@@ -65,6 +65,7 @@ class LiveCell {
   int part_ = 0;  // in place, 0 = none yet
   std::int64_t in_place_us_ = 0;
   std::int64_t held_us_ = 0;                       // the thermal clock stood still: the renderer was behind
+  std::int64_t line_held_us_ = 0;                  // the same for the line, over all parts
   int requested_view_ = -1;                        // of part_
   std::map<int, std::map<int, ViewState>> taken_;  // by part and view: as rendered
   std::size_t sorted_ = 0;

@@ -1,0 +1,89 @@
+#include "tests/line/rendered_cell.h"
+
+#include <unistd.h>
+
+#include "services/common/model/bundle_file.h"
+#include "services/common/model/model_import.h"
+#include "tools/virtual_station/station_writer.h"
+#include "tools/virtual_station/virtual_cell.h"
+
+namespace forgescan::testing {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kScaleDivisor = 4;
+constexpr int kThreads = 2;
+const fs::path kStation = FORGESCAN_SOURCE_DIR "/stations/virtual";
+
+Status WriteFiles(const CellConfig& config, const fs::path& folder) {
+  RETURN_IF_ERROR(WriteStation(config, PatternSet::kReduced, folder.string()));
+  std::error_code problem;
+  fs::copy_file(kStation / "station.toml", folder / "station.toml", fs::copy_options::overwrite_existing,
+                problem);
+  if (problem) {
+    return Fail(ErrorCode::kIo, "{} cannot be copied: {}", (kStation / "station.toml").string(),
+                problem.message());
+  }
+  ASSIGN_OR_RETURN(const ModelBundle model, LoadModel(folder / "model" / "axle.step", {}));
+  return WriteBundle(model, folder / "model" / "axle.bundle");
+}
+
+}  // namespace
+
+struct RenderedCell::Cell {
+  explicit Cell(CellConfig config)
+      : cell(std::move(config), kThreads), patterns(cell.Patterns(PatternSet::kReduced)) {}
+  VirtualCell cell;
+  std::vector<Pattern> patterns;
+};
+
+RenderedCell::RenderedCell(std::unique_ptr<Cell> cell, fs::path folder)
+    : cell_(std::move(cell)), folder_(std::move(folder)) {}
+
+RenderedCell::~RenderedCell() {
+  std::error_code ignored;  // a folder that cannot be removed is no failure of a test
+  fs::remove_all(folder_, ignored);
+}
+
+Result<std::unique_ptr<RenderedCell>> RenderedCell::Create() {
+  ASSIGN_OR_RETURN(CellConfig config, LoadCellConfig(kStation / "cell.toml", kScaleDivisor));
+  const fs::path folder = fs::temp_directory_path() / fmt::format("forgescan_line_{}", ::getpid());
+  RETURN_IF_ERROR(WriteFiles(config, folder));
+  return std::unique_ptr<RenderedCell>(new RenderedCell(std::make_unique<Cell>(std::move(config)), folder));
+}
+
+int RenderedCell::width_px() const { return cell_->cell.config().rig.left.width_px; }
+int RenderedCell::height_px() const { return cell_->cell.config().rig.left.height_px; }
+int RenderedCell::view_count() const { return static_cast<int>(cell_->cell.config().views.size()); }
+std::uint32_t RenderedCell::path_crc32() const { return PathCrc32(cell_->cell.config().views); }
+
+Result<const RenderedView*> RenderedCell::View(int part, int view) {
+  if (const auto found = views_.find({part, view}); found != views_.end()) {
+    return &found->second;
+  }
+  const VirtualCell& cell = cell_->cell;
+  ASSIGN_OR_RETURN(const PartState part_state, cell.Part(part));
+  ASSIGN_OR_RETURN(const ViewState view_state, cell.View(part_state, view));
+  RenderedView rendered{.pyrometer_degc = view_state.pyrometer_degc, .images = {}};
+  for (const Side side : {Side::kLeft, Side::kRight}) {
+    ASSIGN_OR_RETURN(const GeometryMap map, cell.Map(part_state, view_state, side));
+    for (std::size_t i = 0; i < cell_->patterns.size(); ++i) {
+      rendered.images[side == Side::kLeft ? 0 : 1].push_back(
+          cell.Image(map, view_state, side, cell_->patterns[i], static_cast<int>(i)));
+    }
+  }
+  return &views_.emplace(std::make_pair(part, view), std::move(rendered)).first->second;
+}
+
+Result<std::map<std::string, double>> RenderedCell::TrueSizesMm(int part) const {
+  ASSIGN_OR_RETURN(const PartState state, cell_->cell.Part(part));
+  const AxleSize& size = state.size;
+  return std::map<std::string, double>{{"total_length", size.total_length_mm},
+                                       {"left_plate_width", size.left_plate_width_mm},
+                                       {"right_plate_width", size.right_plate_width_mm},
+                                       {"left_cylinder_diameter", size.left_cylinder_diameter_mm},
+                                       {"right_cylinder_diameter", size.right_cylinder_diameter_mm}};
+}
+
+}  // namespace forgescan::testing

@@ -1,0 +1,188 @@
+#include "tests/line/sim_line.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+
+#include "services/common/bus/channels.h"
+#include "services/common/model/bundle_file.h"
+
+namespace forgescan::testing {
+namespace {
+
+constexpr std::int64_t kSecondUs = 1'000'000;
+constexpr std::int64_t kPartPatienceUs = 70 * kSecondUs;  // takt 45 s, then what a lossy bus adds
+constexpr std::int64_t kDispatchUs = 5'000;
+constexpr int kEveryNthPoint = 2;                                   // published, of a sixteenth of the pixels
+constexpr std::int64_t kCameraClockUs[2] = {7'654'321, 1'234'567};  // ahead of the station's
+
+RobotSimConfig RobotOf(const RenderedCell& cell) {
+  RobotSimConfig config;
+  config.view_count = static_cast<std::uint16_t>(cell.view_count());
+  config.path_crc32 = cell.path_crc32();
+  return config;
+}
+
+LineSimConfig LineOf(int parts) {
+  LineSimConfig config;
+  config.parts = parts;
+  return config;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<SimLine>> SimLine::Create(RenderedCell& cell, int parts) {
+  std::unique_ptr<SimLine> line(new SimLine(cell, parts));
+  ASSIGN_OR_RETURN(const Station station, Station::Load(cell.folder().string()));
+  RETURN_IF_ERROR(line->MakeCellServices(station));
+  RETURN_IF_ERROR(line->MakeCamera(station, 0));
+  RETURN_IF_ERROR(line->MakeCamera(station, 1));
+  RETURN_IF_ERROR(line->MakeViewServices(station));
+  RETURN_IF_ERROR(line->MakePartServices(station));
+  line->Observe();
+  return line;
+}
+
+SimLine::SimLine(RenderedCell& cell, int parts) : cell_(cell), robot_(RobotOf(cell)), line_(LineOf(parts)) {
+  for (const char* name : {"robot", "trigger", "cooling", "camera_left", "camera_right", "reconstruction",
+                           "fusion", "registration", "report", "observer"}) {
+    hosts_[name] = std::make_unique<Host>(network_, name);
+  }
+  CameraSimOptions camera;
+  camera.width_px = cell.width_px();
+  camera.height_px = cell.height_px();
+  cameras_ = {std::make_unique<CameraSim>(camera), std::make_unique<CameraSim>(camera)};
+  trigger_.SetEdgeHandler([this](const TriggerSim::Edge& edge) { Expose(edge); });
+  line_.SetTemperature([this](std::uint32_t part, std::int64_t) {
+    const auto view = cell_.View(static_cast<int>(part), robot_.status().view);
+    return view.ok() ? (*view)->pyrometer_degc : std::nan("");
+  });
+}
+
+Status SimLine::MakeCellServices(const Station& station) {
+  ASSIGN_OR_RETURN(const auto robot, RobotConfig::Load(station.file.Table("robot")));
+  ASSIGN_OR_RETURN(const auto trigger, TriggerConfig::Load(station.file.Table("trigger")));
+  ASSIGN_OR_RETURN(const auto cooling, CoolingConfig::Load(station.file.Table("cooling")));
+  robot_service_ = std::make_unique<RobotService>(At("robot").hub, At("robot").monitor,
+                                                  RobotService::Devices{robot_, line_}, robot);
+  trigger_service_ =
+      std::make_unique<TriggerService>(At("trigger").hub, At("trigger").monitor, trigger_, trigger);
+  cooling_service_ =
+      std::make_unique<CoolingService>(At("cooling").hub, At("cooling").monitor, cooling_, cooling);
+  return {};
+}
+
+Status SimLine::MakeCamera(const Station& station, std::size_t side) {
+  const std::string name = side == 0 ? "left" : "right";
+  ASSIGN_OR_RETURN(const CameraConfig config, CameraConfig::Load(station.file.Table("camera"), name));
+  Host& host = *hosts_.at("camera_" + name);
+  camera_services_[side] = std::make_unique<CameraService>(
+      host.hub, host.monitor, *cameras_[side], config,
+      side == 0 ? fsmsg::exposure_t::CAMERA_LEFT : fsmsg::exposure_t::CAMERA_RIGHT);
+  host.bus.Every(kDispatchUs, [camera = cameras_[side].get()] { camera->Dispatch(); });
+  return {};
+}
+
+Status SimLine::MakeViewServices(const Station& station) {
+  ASSIGN_OR_RETURN(auto reconstruction,
+                   ReconstructionServiceConfig::Load(station.file.Table("reconstruction")));
+  reconstruction.publish_every_nth_point = kEveryNthPoint;
+  ASSIGN_OR_RETURN(PatternSet pattern, LoadPatternSet(station.pattern));
+  ASSIGN_OR_RETURN(StereoCalibration calibration, LoadStereoCalibration(station.calibration));
+  reconstruction_service_ =
+      std::make_unique<ReconstructionService>(At("reconstruction").hub, At("reconstruction").monitor,
+                                              reconstruction, std::move(pattern), std::move(calibration));
+  ASSIGN_OR_RETURN(FusionConfig fusion, FusionConfig::Load(station.file.Table("fusion")));
+  ASSIGN_OR_RETURN(ExpansionCurve curve, ExpansionCurve::Create(fusion.expansion_degc, fusion.expansion));
+  ASSIGN_OR_RETURN(ViewMatrices matrices, ViewMatrices::Load(station.views));
+  fusion_service_ = std::make_unique<FusionService>(At("fusion").hub, At("fusion").monitor, std::move(fusion),
+                                                    std::move(matrices), std::move(curve));
+  return {};
+}
+
+Status SimLine::MakePartServices(const Station& station) {
+  ASSIGN_OR_RETURN(RegistrationConfig registration,
+                   RegistrationConfig::Load(station.file.Table("registration")));
+  ASSIGN_OR_RETURN(const ModelBundle bundle, ReadBundle(station.model));
+  ASSIGN_OR_RETURN(RegistrationModel model, RegistrationModel::Build(bundle));
+  registration_service_ = std::make_unique<RegistrationService>(
+      At("registration").hub, At("registration").monitor, std::move(registration), std::move(model));
+  std::error_code ignored;  // there may be none
+  std::filesystem::remove_all(station.results, ignored);
+  ASSIGN_OR_RETURN(const ReportConfig report, ReportConfig::Load(station.file.Table("report")));
+  ASSIGN_OR_RETURN(evaluator_, ModelEvaluator::Load(station.model, station.features));
+  ASSIGN_OR_RETURN(
+      report_service_,
+      ReportService::Create(At("report").hub, At("report").monitor, report,
+                            {station.name, "0", station.file.hash(), station.results}, *evaluator_));
+  return {};
+}
+
+void SimLine::Observe() {
+  StreamHub& hub = At("observer").hub;
+  hub.Subscribe<fsmsg::view_captured_t>(kViewCaptured, [this](const auto& m) { views_.push_back(m); });
+  hub.Subscribe<fsmsg::scan_complete_t>(kScanComplete, [this](const auto& m) { scans_.push_back(m); });
+  hub.Subscribe<fsmsg::verdict_t>(kVerdict, [this](const auto& m) { verdicts_.push_back(m); });
+  hub.Subscribe<fsmsg::part_sorted_t>(kPartSorted, [this](const auto& m) { sorted_.push_back(m); });
+  for (const char* channel : {kViewCloud.name, kViewResult.name, kFusedCloud.name, kFusionResult.name,
+                              kRegisteredCloud.name, kRegistration.name, kVerdict.name}) {
+    Record(channel);
+  }
+}
+
+void SimLine::Record(const char* channel) {
+  const std::string name = channel;
+  At("observer").bus.Subscribe(name, [this, name](ByteView message) {
+    published_.emplace_back(name.begin(), name.end());
+    published_.emplace_back(message.begin(), message.end());
+  });
+}
+
+// What the cameras see at an edge: the view the robot holds, of the part in place.
+void SimLine::Expose(const TriggerSim::Edge& edge) {
+  const int part = static_cast<int>(line_.part().part);
+  const auto view = cell_.View(part, edge.view);
+  ASSERT_TRUE(view.ok()) << view.error().message;
+  const std::size_t side = edge.right ? 1 : 0;
+  CameraSim& camera = *cameras_[side];
+  const bool lost = lost_frame_.has_value() && lost_frame_->part == part && lost_frame_->view == edge.view &&
+                    lost_frame_->pattern == edge.pattern && lost_frame_->right == edge.right;
+  camera.SetFaults({.lost_frame_chance = lost ? 1.0 : 0.0});
+  const Status fired = camera.Trigger(edge.utime + kCameraClockUs[side], (*view)->images[side][edge.pattern]);
+  ASSERT_TRUE(fired.ok()) << fired.error().message;
+}
+
+bool SimLine::RunUntilSorted(int parts) {
+  const auto sorted = static_cast<std::size_t>(parts);
+  return network_.RunUntilTrue([&] { return sorted_.size() >= sorted; }, parts * kPartPatienceUs);
+}
+
+bool SimLine::RunUntilViews(std::size_t views) {
+  return network_.RunUntilTrue([&] { return views_.size() >= views; }, kPartPatienceUs);
+}
+
+StreamCounters SimLine::StreamTotals() const {
+  StreamCounters total;
+  for (const auto& [name, host] : hosts_) {
+    const StreamCounters& counters = host->hub.counters();
+    total.published += counters.published;
+    total.delivered += counters.delivered;
+    total.missing += counters.missing;
+    total.recovered += counters.recovered;
+    total.resent += counters.resent;
+    total.duplicates += counters.duplicates;
+    total.damaged += counters.damaged;
+  }
+  return total;
+}
+
+std::int64_t SimLine::Total(const std::string& counter) const {
+  std::int64_t total = 0;
+  for (const auto& [name, host] : hosts_) {
+    total += host->monitor.counter(counter);
+  }
+  return total;
+}
+
+}  // namespace forgescan::testing
