@@ -75,7 +75,7 @@ TEST_F(LostCloudTest, AWholeCloudIsNotGivenUp) {
   Slices(1, 2);
   network_.RunFor(30 * kSecondUs);
   ASSERT_EQ(results_.size(), 1U);  // and fails for what it is: one point, 150 000 times
-  EXPECT_THAT(results_[0].reason, testing::Not(HasSubstr("not whole")));
+  EXPECT_THAT(results_[0].reason, ::testing::Not(HasSubstr("not whole")));
 }
 
 TEST_F(LostCloudTest, ThePartNumberMayComeAgain) {
