@@ -132,7 +132,7 @@ TEST(Layout, VendorHeadersStayInTheirFiles) {
       {std::regex("^linux/can"), std::regex("^drivers/can/can_socketcan\\.cc$")},
       {std::regex("^sqlite3\\.h$"), std::regex("^services/report/|^tests/services/report/")},
       {std::regex("^embree"), std::regex("^tools/virtual_station/\\w+\\.cc$")},
-      {std::regex("^(BRep|TopoDS|STEP|XCAF|gp_)"), std::regex("\\.cc$")},
+      {std::regex("^(BRep|TopoDS|STEP|XCAF|gp_)"), std::regex("\\.cc$|_shape\\.h$")},  // private headers of shapes
   };
   ForEachInclude([&rules](const std::string& path, const std::string& include) {
     for (const Rule& rule : rules) {

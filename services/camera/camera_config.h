@@ -12,7 +12,7 @@ struct CameraConfig {
   std::string address;  // of this camera, IPv4
   int width_px = 2448;
   int height_px = 2048;
-  int exposure_us = 10'000;      // as the trigger service orders it
+  int exposure_us = 12'000;      // as the trigger service orders it; every frame is checked against it
   int packet_size_bytes = 9000;  // IP packet
   int packet_delay_ns = 0;
   double frame_deadline_s = 1.0;  // from an exposure record to its frame: exposure, wire time and resends

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <cstdlib>
+
 #include "services/common/bus/channels.h"
 
 namespace forgescan {
@@ -9,6 +11,7 @@ namespace {
 
 constexpr std::int64_t kTimerUs = 20'000;
 constexpr std::size_t kExposuresKept = 1024;
+constexpr std::int64_t kExposureRounding_us = 20;  // cameras round to their line time
 
 std::int64_t ToUs(double seconds) { return static_cast<std::int64_t>(seconds * 1e6); }
 
@@ -66,7 +69,7 @@ CameraService::~CameraService() {
 void CameraService::StartCamera() {
   const Status started = camera_.Start();
   if (started.ok()) {
-    pairing_.OnCameraStarted();
+    Carry(pairing_.OnCameraStarted());
     monitor_.SetState(ServiceState::kReady, fmt::format("armed at {}", config_.address));
     return;
   }
@@ -79,12 +82,18 @@ void CameraService::OnExposure(const fsmsg::exposure_t& exposure) {
   if (exposure.camera != side_) {
     return;
   }
-  exposures_[exposure.pulse] = exposure;
+  const std::uint64_t record = next_record_++;
+  exposures_.emplace(record, exposure);
   while (exposures_.size() > kExposuresKept) {
     exposures_.erase(exposures_.begin());
   }
   const std::int64_t deadline_us = hub_.bus().NowUs() + ToUs(config_.frame_deadline_s);
-  Carry(pairing_.OnPulse({ViewKey(exposure), exposure.pulse, exposure.device_time_us, deadline_us}));
+  Carry(pairing_.OnPulse({.view_key = ViewKey(exposure),
+                          .pulse = exposure.pulse,
+                          .device_time_us = exposure.device_time_us,
+                          .deadline_us = deadline_us,
+                          .fired_us = exposure.utime,
+                          .record = record}));
 }
 
 void CameraService::OnCaptured(const fsmsg::view_captured_t& captured) {
@@ -119,7 +128,7 @@ void CameraService::CarryOne(const PairingAction& action) {
   if (action.verdict == PairingVerdict::kStray) {
     return monitor_.Count("frames_stray");
   }
-  const auto found = exposures_.find(action.pulse);
+  const auto found = exposures_.find(action.record);
   if (found == exposures_.end()) {
     return monitor_.ReportError(
         Fail(ErrorCode::kProtocol, "pulse {} was paired, but its record is gone", action.pulse));
@@ -135,16 +144,34 @@ void CameraService::CarryOne(const PairingAction& action) {
       monitor_.Count("frames_late");
       return book_.OnLate(exposure);
     default:
-      const Error lost =
-          Fail(ErrorCode::kUntrusted, "part {} view {}: pulse {} (pattern {}) {}", exposure.part,
-               exposure.view, exposure.pulse, exposure.pattern, Describe(action.verdict));
-      monitor_.Count("frames_missing");
-      monitor_.ReportError(lost);
-      return book_.OnMissing(exposure, lost.message);
+      return GiveUp(exposure, Describe(action.verdict));
   }
 }
 
+void CameraService::GiveUp(const fsmsg::exposure_t& exposure, const std::string& what) {
+  const Error lost = Fail(ErrorCode::kUntrusted, "part {} view {}: pulse {} (pattern {}) {}", exposure.part,
+                          exposure.view, exposure.pulse, exposure.pattern, what);
+  monitor_.Count("frames_missing");
+  monitor_.ReportError(lost);
+  book_.OnMissing(exposure, lost.message);
+}
+
+std::string CameraService::WrongExposure(const fsmsg::exposure_t& exposure, const CameraFrame& frame) const {
+  if (exposure.exposure_us != config_.exposure_us) {
+    return fmt::format(
+        "was ordered with {} us of exposure ([trigger]), the camera is set to {} us ([camera])",
+        exposure.exposure_us, config_.exposure_us);
+  }
+  if (std::abs(frame.exposure_us - exposure.exposure_us) > kExposureRounding_us) {
+    return fmt::format("was exposed for {} us instead of {} us", frame.exposure_us, exposure.exposure_us);
+  }
+  return {};
+}
+
 void CameraService::PublishFrame(const fsmsg::exposure_t& exposure, const CameraFrame& frame) {
+  if (const std::string wrong = WrongExposure(exposure, frame); !wrong.empty()) {
+    return GiveUp(exposure, wrong);
+  }
   fsmsg::frame_t message{};
   message.utime = exposure.utime;
   message.part = exposure.part;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <string>
 
 #include "drivers/camera/camera.h"
 #include "fsmsg/exposure_t.hpp"
@@ -27,6 +28,9 @@ class CameraService {
   void OnFrame(CameraFrame frame);
   void Carry(const std::vector<PairingAction>& actions);
   void CarryOne(const PairingAction& action);
+  void GiveUp(const fsmsg::exposure_t& exposure, const std::string& what);
+  // Why the image does not show what was ordered; empty = it does.
+  std::string WrongExposure(const fsmsg::exposure_t& exposure, const CameraFrame& frame) const;
   void PublishFrame(const fsmsg::exposure_t& exposure, const CameraFrame& frame);
   void PublishClosedViews();
   void CountCamera();
@@ -40,8 +44,9 @@ class CameraService {
   Channel<fsmsg::view_frames_t> manifest_channel_;
   FramePairing pairing_;
   ViewBook book_;
-  std::map<std::int64_t, fsmsg::exposure_t> exposures_;  // by pulse, the newest
-  std::map<std::uint64_t, CameraFrame> frames_;          // by handle: waiting for their pulse
+  std::map<std::uint64_t, fsmsg::exposure_t> exposures_;  // by order of arrival, the newest
+  std::map<std::uint64_t, CameraFrame> frames_;           // by handle: waiting for their pulse
+  std::uint64_t next_record_ = 1;
   std::uint64_t next_handle_ = 1;
   Bus::TimerId timer_ = 0;
 };

@@ -14,6 +14,12 @@ std::int64_t IdStep(std::uint64_t from, std::uint64_t to) {
   return static_cast<std::int64_t>(from == 0 ? to : (to + kIds - from) % kIds);
 }
 
+PairingAction Stray(const FrameRecord& frame) { return {PairingVerdict::kStray, 0, frame.handle, 0}; }
+
+PairingAction Missing(const PulseRecord& pulse) {
+  return {PairingVerdict::kMissing, pulse.pulse, std::nullopt, pulse.record};
+}
+
 }  // namespace
 
 Status FramePairingOptions::Check() const {
@@ -29,14 +35,21 @@ Status FramePairingOptions::Check() const {
 }
 
 std::vector<PairingAction> FramePairing::OnPulse(const PulseRecord& record) {
+  std::vector<PairingAction> actions;
+  if (!pulses_.empty() && (record.pulse <= pulses_.back().record.pulse ||
+                           record.device_time_us <= pulses_.back().record.device_time_us)) {
+    ForgetPulses(actions);  // the controller was started again, or its link: it counts from the beginning
+  }
   if (view_key_ != record.view_key) {
-    BeginView(record);
+    BeginView(record, actions);
   }
   pulses_.push_back({record, PulseState::kOpen});
   while (pulses_.size() > options_.memory_pulses && pulses_.front().state != PulseState::kOpen) {
     pulses_.pop_front();
   }
-  return TryWaiting();
+  const auto paired = TryWaiting();
+  actions.insert(actions.end(), paired.begin(), paired.end());
+  return actions;
 }
 
 std::vector<PairingAction> FramePairing::OnFrame(const FrameRecord& frame) {
@@ -49,15 +62,14 @@ std::vector<PairingAction> FramePairing::AdvanceTo(std::int64_t now_us) {
   for (Pulse& pulse : pulses_) {
     if (pulse.state == PulseState::kOpen && pulse.record.deadline_us <= now_us) {
       pulse.state = PulseState::kGivenUp;
-      view_has_gaps_ = true;
-      actions.push_back({PairingVerdict::kMissing, pulse.record.pulse, std::nullopt});
+      actions.push_back(Missing(pulse.record));
     }
   }
   std::erase_if(waiting_, [&](const FrameRecord& frame) {
     const bool expired = frame.arrived_us + options_.patience_us <= now_us;
     if (expired) {
-      last_id_ = frame.frame_id;
-      actions.push_back({PairingVerdict::kStray, 0, frame.handle});
+      NoteId(frame.frame_id);
+      actions.push_back(Stray(frame));
     }
     return expired;
   });
@@ -67,27 +79,63 @@ std::vector<PairingAction> FramePairing::AdvanceTo(std::int64_t now_us) {
 std::vector<PairingAction> FramePairing::OnCameraStarted() {
   std::vector<PairingAction> actions;
   for (const FrameRecord& frame : waiting_) {
-    actions.push_back({PairingVerdict::kStray, 0, frame.handle});
+    actions.push_back(Stray(frame));
   }
   waiting_.clear();
   anchor_.reset();
   view_key_.reset();  // what follows counts as a new view
   last_id_ = 0;
-  view_has_gaps_ = false;
+  last_view_had_gaps_ = false;
   return actions;
 }
 
-void FramePairing::BeginView(const PulseRecord& first) {
-  if (anchor_ && view_key_) {
-    anchor_->confirmed = anchor_->confirmed || !view_has_gaps_;
-    if (!anchor_->confirmed) {
-      anchor_.reset();
+void FramePairing::ForgetPulses(std::vector<PairingAction>& actions) {
+  for (const Pulse& pulse : pulses_) {
+    if (pulse.state == PulseState::kOpen) {
+      actions.push_back(Missing(pulse.record));
     }
   }
+  pulses_.clear();
+  anchor_.reset();
+  view_key_.reset();
+  last_view_had_gaps_ = false;
+}
+
+void FramePairing::BeginView(const PulseRecord& first, std::vector<PairingAction>& actions) {
+  if (anchor_ && view_key_) {
+    JudgeAnchor(first);
+  }
+  // Records come in order: a frame from before this view that still waits has lost its pulse.
+  std::erase_if(waiting_, [&](const FrameRecord& frame) {
+    const bool older = frame.arrived_us < first.fired_us - options_.fired_error_us;
+    if (older) {
+      NoteId(frame.frame_id);
+      actions.push_back(Stray(frame));
+    }
+    return older;
+  });
   view_key_ = first.view_key;
   view_first_pulse_ = first.pulse;
   id_before_view_ = last_id_;
-  view_has_gaps_ = false;
+}
+
+// At the end of a view: is the learnt offset still to be believed?
+void FramePairing::JudgeAnchor(const PulseRecord& first) {
+  bool has_gaps = false, has_frames = false;
+  for (auto pulse = pulses_.rbegin(); pulse != pulses_.rend() && pulse->record.view_key == view_key_;
+       ++pulse) {
+    const bool paired = pulse->state == PulseState::kPaired;
+    has_frames = has_frames || paired;
+    has_gaps = has_gaps || !paired;  // one that is still open has not shown that the guess was right
+  }
+  const bool believed = !has_gaps || (anchor_->confirmed && has_frames && !last_view_had_gaps_);
+  last_view_had_gaps_ = has_gaps;
+  if (!believed || WindowUs(first) > options_.max_window_us) {
+    anchor_.reset();
+    last_view_had_gaps_ = false;
+  } else {
+    anchor_->confirmed = true;
+  }
 }
 
 std::vector<PairingAction> FramePairing::TryWaiting() {
@@ -105,7 +153,7 @@ std::vector<PairingAction> FramePairing::TryWaiting() {
 // Nothing if the frame's pulse is not known yet.
 std::optional<PairingAction> FramePairing::Try(const FrameRecord& frame) {
   if (frame.frame_id == 0 || frame.frame_id > kIds) {
-    return PairingAction{PairingVerdict::kStray, 0, frame.handle};  // without id and time nothing can be said
+    return Stray(frame);  // without id and time nothing can be said
   }
   Pulse* pulse = anchor_ ? FindByTime(frame) : FindById(frame);
   if (pulse == nullptr) {
@@ -114,16 +162,20 @@ std::optional<PairingAction> FramePairing::Try(const FrameRecord& frame) {
   return Assign(*pulse, frame);
 }
 
+// How far the frame of a pulse may be from where the offset puts it.
+std::int64_t FramePairing::WindowUs(const PulseRecord& pulse) const {
+  const std::int64_t elapsed_us = std::abs(pulse.device_time_us - anchor_->pulse.device_time_us);
+  return options_.tolerance_us + std::llround(options_.drift_ppm * 1e-6 * static_cast<double>(elapsed_us));
+}
+
 FramePairing::Pulse* FramePairing::FindByTime(const FrameRecord& frame) {
   Pulse* best = nullptr;
   std::int64_t best_us = 0;
   for (Pulse& pulse : pulses_) {
-    const std::int64_t elapsed_us = std::abs(pulse.record.device_time_us - anchor_->pulse.device_time_us);
-    const auto drift_us = std::llround(options_.drift_ppm * 1e-6 * static_cast<double>(elapsed_us));
-    const std::int64_t window_us = options_.tolerance_us + drift_us;
+    const std::int64_t window_us = std::min(WindowUs(pulse.record), options_.max_window_us);
     const std::int64_t error_us =
         std::abs(frame.device_time_us - pulse.record.device_time_us - anchor_->offset_us);
-    if (error_us <= std::min(window_us, options_.max_window_us) && (best == nullptr || error_us < best_us)) {
+    if (error_us <= window_us && (best == nullptr || error_us < best_us)) {
       best = &pulse;
       best_us = error_us;
     }
@@ -142,29 +194,34 @@ FramePairing::Pulse* FramePairing::FindById(const FrameRecord& frame) {
   return found == pulses_.end() ? nullptr : &*found;
 }
 
+// A late frame does not count back.
+void FramePairing::NoteId(std::uint64_t id) {
+  const bool known = id >= 1 && id <= kIds;
+  if (known && IdStep(last_id_, id) <= static_cast<std::int64_t>(kIds / 2)) {
+    last_id_ = id;
+  }
+}
+
 PairingAction FramePairing::Assign(Pulse& pulse, const FrameRecord& frame) {
-  const std::int64_t number = pulse.record.pulse;
+  const auto gets = [&](PairingVerdict verdict) {
+    return PairingAction{verdict, pulse.record.pulse, frame.handle, pulse.record.record};
+  };
   if (pulse.state == PulseState::kPaired) {
-    return {PairingVerdict::kDuplicate, number, frame.handle};
+    return gets(PairingVerdict::kDuplicate);
   }
+  NoteId(frame.frame_id);
   if (pulse.state == PulseState::kGivenUp) {
-    last_id_ = frame.frame_id;
-    return {PairingVerdict::kLate, number, frame.handle};
+    return gets(PairingVerdict::kLate);
   }
-  const bool agrees = IdAgrees(pulse, frame);
-  if (agrees) {
-    last_id_ = frame.frame_id;
-    const bool confirmed = anchor_ && anchor_->confirmed;
-    anchor_ =
-        Anchor{frame.device_time_us - pulse.record.device_time_us, pulse.record, frame.frame_id, confirmed};
+  if (!IdAgrees(pulse, frame)) {
+    pulse.state = PulseState::kGivenUp;
+    return gets(PairingVerdict::kContradiction);
   }
-  const bool paired = agrees && frame.complete;
-  pulse.state = paired ? PulseState::kPaired : PulseState::kGivenUp;
-  view_has_gaps_ = view_has_gaps_ || !paired;
-  if (paired) {
-    return {PairingVerdict::kPaired, number, frame.handle};
-  }
-  return {agrees ? PairingVerdict::kIncomplete : PairingVerdict::kContradiction, number, frame.handle};
+  const bool confirmed = anchor_ && anchor_->confirmed;
+  anchor_ =
+      Anchor{frame.device_time_us - pulse.record.device_time_us, pulse.record, frame.frame_id, confirmed};
+  pulse.state = frame.complete ? PulseState::kPaired : PulseState::kGivenUp;
+  return gets(frame.complete ? PairingVerdict::kPaired : PairingVerdict::kIncomplete);
 }
 
 // Later pulses have later ids, and the camera cannot have exposed more edges than there were pulses.

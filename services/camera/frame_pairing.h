@@ -8,12 +8,16 @@
 //
 //   no anchor --frame, by id step since the view before--> anchor --view without a missing pulse--> confirmed
 //   anchor
-//       ^                                                    |
-//       +------ next view, if a pulse of this one is missing +
+//       ^                                                    |                                          |
+//       +------ next view, if a pulse of this one is missing +                                          |
+//       +------ next view, if no pulse of this one has a frame, or if pulses were missing in two views  |
+//       |       running, or if the pause before it was so long that drift makes time ambiguous ---------+
+//       +------ at once, if pulse number or time of the controller go back: it was started again
 //
 // With an anchor only time assigns; the id must then step by at most as much as the pulse (less: edges the
 // camera did not see). A first assignment that is off by k pulses leaves k pulses without a frame, so it
-// voids its own view and is forgotten with it; no view is ever complete and wrong.
+// voids its own view and is forgotten with it; no view is ever complete and wrong. A frame that arrived
+// before a view's first pulse was fired never belongs to that view.
 #pragma once
 
 #include <cstddef>
@@ -30,9 +34,11 @@ struct FramePairingOptions {
   std::int64_t tolerance_us = 300;  // jitter of both stamps together
   double drift_ppm = 100;           // of the clocks against each other
   std::int64_t max_window_us =
-      8000;  // beyond this the old offset is forgotten; less than half the pulse period
+      8000;  // a pause that lets the clocks drift further ends the offset; less than half the pulse period
   std::int64_t patience_us = 1'000'000;  // how long a frame waits for its exposure record
   std::size_t memory_pulses = 512;       // how far back late and duplicate frames are recognised
+  std::int64_t fired_error_us =
+      20'000;  // of PulseRecord::fired_us; less than exposure and wire time of a frame
 
   Status Check() const;
 };
@@ -43,6 +49,8 @@ struct PulseRecord {
   std::int64_t pulse = 0;     // counted by the controller, +1 each
   std::int64_t device_time_us = 0;
   std::int64_t deadline_us = 0;  // after this the pulse has no frame
+  std::int64_t fired_us = 0;     // on the clock of AdvanceTo(), not after the exposure's end; 0: not known
+  std::uint64_t record = 0;      // the caller's name for the pulse; numbers begin again, this should not
 };
 
 struct FrameRecord {
@@ -68,6 +76,7 @@ struct PairingAction {
   PairingVerdict verdict;
   std::int64_t pulse = 0;               // not for kStray
   std::optional<std::uint64_t> handle;  // not for kMissing
+  std::uint64_t record = 0;             // of the pulse; not for kStray
 };
 
 // Pure: time comes in as an argument. Not thread-safe.
@@ -97,12 +106,16 @@ class FramePairing {
     bool confirmed = false;
   };
 
-  void BeginView(const PulseRecord& first);
+  void ForgetPulses(std::vector<PairingAction>& actions);
+  void BeginView(const PulseRecord& first, std::vector<PairingAction>& actions);
+  void JudgeAnchor(const PulseRecord& first);
+  std::int64_t WindowUs(const PulseRecord& pulse) const;
   std::vector<PairingAction> TryWaiting();
   std::optional<PairingAction> Try(const FrameRecord& frame);
   Pulse* FindByTime(const FrameRecord& frame);
   Pulse* FindById(const FrameRecord& frame);
   PairingAction Assign(Pulse& pulse, const FrameRecord& frame);
+  void NoteId(std::uint64_t id);
   bool IdAgrees(const Pulse& pulse, const FrameRecord& frame) const;
 
   const FramePairingOptions options_;
@@ -113,7 +126,7 @@ class FramePairing {
   std::int64_t view_first_pulse_ = 0;
   std::uint64_t id_before_view_ = 0;  // the last id seen before this view; 0: none since the camera's start
   std::uint64_t last_id_ = 0;
-  bool view_has_gaps_ = false;
+  bool last_view_had_gaps_ = false;
 };
 
 }  // namespace forgescan

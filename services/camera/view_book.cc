@@ -2,21 +2,77 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 namespace forgescan {
+namespace {
+
+constexpr std::size_t kMaxOpen = 16;     // one is being exposed, a few wait for late frames
+constexpr std::size_t kClosedKept = 64;  // some parts back
+
+}  // namespace
+
+ViewBook::View* ViewBook::Open(const Key& key, std::int64_t utime) {
+  const bool closed = std::any_of(closed_.begin(), closed_.end(),
+                                  [&](const Closed& one) { return one.key == key && utime <= one.utime; });
+  if (closed) {
+    return nullptr;
+  }
+  if (views_.size() >= kMaxOpen && !views_.contains(key)) {
+    const auto oldest = std::min_element(views_.begin(), views_.end(), [](const auto& a, const auto& b) {
+      return a.second.order < b.second.order;
+    });
+    views_.erase(oldest);
+  }
+  const auto [entry, is_new] = views_.try_emplace(key);
+  if (is_new) {
+    entry->second.order = next_order_++;
+  }
+  return &entry->second;
+}
+
+void ViewBook::Close(const Key& key, std::int64_t utime) {
+  views_.erase(key);
+  closed_.push_back({key, utime});
+  if (closed_.size() > kClosedKept) {
+    closed_.pop_front();
+  }
+}
+
+void ViewBook::OnSent(const fsmsg::exposure_t& exposure) {
+  if (View* view = Open(KeyOf(exposure), exposure.utime)) {
+    ++view->frames_sent;
+  }
+}
 
 void ViewBook::OnMissing(const fsmsg::exposure_t& exposure, const std::string& reason) {
-  View& view = views_[KeyOf(exposure)];
-  ++view.frames_missing;
-  if (view.reason.empty()) {
-    view.reason = reason;
+  View* view = Open(KeyOf(exposure), exposure.utime);
+  if (view == nullptr) {
+    return;
+  }
+  ++view->frames_missing;
+  if (view->reason.empty()) {
+    view->reason = reason;
+  }
+}
+
+void ViewBook::OnLate(const fsmsg::exposure_t& exposure) {
+  if (View* view = Open(KeyOf(exposure), exposure.utime)) {
+    ++view->frames_late;
+  }
+}
+
+void ViewBook::OnDuplicate(const fsmsg::exposure_t& exposure) {
+  if (View* view = Open(KeyOf(exposure), exposure.utime)) {
+    ++view->frames_duplicate;
   }
 }
 
 void ViewBook::OnCaptured(const fsmsg::view_captured_t& captured) {
-  if (captured.status == fsmsg::view_captured_t::STATUS_CAPTURED) {
-    views_[KeyOf(captured)].captured = captured;
-  } else {
-    views_.erase(KeyOf(captured));
+  if (captured.status != fsmsg::view_captured_t::STATUS_CAPTURED) {
+    Close(KeyOf(captured), captured.utime);
+  } else if (View* view = Open(KeyOf(captured), captured.utime)) {
+    view->captured = captured;
   }
 }
 
@@ -53,7 +109,10 @@ std::vector<fsmsg::view_frames_t> ViewBook::TakeClosed() {
     manifest.frames_duplicate = view.frames_duplicate;
     manifest.reason = view.reason;
     closed.push_back(manifest);
-    entry = views_.erase(entry);
+    ++entry;
+  }
+  for (const fsmsg::view_frames_t& manifest : closed) {
+    Close({manifest.part, manifest.view, manifest.attempt}, manifest.utime);
   }
   return closed;
 }

@@ -12,6 +12,8 @@ Result<FusionConfig> FusionConfig::Load(ConfigTable table) {
   }
   table.Optional("missing_views_allowed", config.missing_views_allowed, 0, 100);
   table.Optional("view_timeout_s", config.view_timeout_s, 1.0, 3600.0);
+  table.Optional("max_body_change_k", config.max_body_change_k, 0.1, 200.0);
+  table.Optional("body_change_voids", config.body_change_voids);
   RETURN_IF_ERROR(table.Finish());
   return config;
 }

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
+
 #include "services/common/bus/channels.h"
 #include "services/common/service/step_timer.h"
 
@@ -9,6 +11,7 @@ namespace forgescan {
 namespace {
 
 constexpr std::size_t kMaxPartsInWork = 8;
+constexpr std::size_t kFinishedKept = 64;
 
 }  // namespace
 
@@ -18,53 +21,100 @@ FusionService::FusionService(StreamHub& hub, ServiceMonitor& monitor, FusionConf
       monitor_(monitor),
       config_(std::move(config)),
       matrices_(std::move(matrices)),
-      curve_(std::move(curve)) {
+      curve_(std::move(curve)),
+      parts_(kMaxPartsInWork),
+      finished_(kFinishedKept) {
   hub_.Advertise(kFusedCloud);
   hub_.Advertise(kFusionResult);
   hub_.Advertise(kFusionTime);
-  hub_.Subscribe<fsmsg::part_arrived_t>(kPartArrived, [this](const auto& arrived) {
-    Part(arrived.part).OnArrived(arrived);
-    FinishIfSettled(arrived.part);
-  });
+  hub_.Subscribe<fsmsg::part_arrived_t>(kPartArrived, [this](const auto& arrived) { OnArrived(arrived); });
+  hub_.Subscribe<fsmsg::view_ready_t>(kViewReady, [this](const auto& ready) { OnViewReady(ready); });
   hub_.Subscribe<fsmsg::view_result_t>(kViewResult, [this](const auto& result) {
-    Part(result.part).OnViewResult(result);
-    FinishIfSettled(result.part);
+    if (PartCollector* part = Part(result.part)) {
+      part->OnViewResult(result);
+      FinishIfSettled(result.part);
+    }
   });
   hub_.Subscribe<fsmsg::part_temperature_t>(kPartTemperature, [this](const auto& temperature) {
-    Part(temperature.part).OnTemperature(temperature);
-    FinishIfSettled(temperature.part);
+    if (PartCollector* part = Part(temperature.part)) {
+      part->OnTemperature(temperature);
+      FinishIfSettled(temperature.part);
+    }
   });
   hub_.Subscribe<fsmsg::cloud_slice_t>(kViewCloud, [this](const auto& slice) { OnCloudSlice(slice); });
   hub_.Subscribe<fsmsg::scan_complete_t>(kScanComplete, [this](const auto& scan) { OnScanComplete(scan); });
   monitor_.SetState(ServiceState::kReady, "waiting for a part");
 }
 
-PartCollector& FusionService::Part(int part) {
-  if (parts_.size() >= kMaxPartsInWork && !parts_.contains(part)) {
-    monitor_.ReportError(
-        Fail(ErrorCode::kUntrusted, "part {} never finished and is dropped", parts_.begin()->first));
-    assembler_.Forget(parts_.begin()->first);
-    parts_.erase(parts_.begin());
+PartCollector* FusionService::Part(int part) {
+  if (finished_.Find(part) != nullptr) {
+    monitor_.Count("messages_late");
+    return nullptr;
   }
-  return parts_[part];
+  if (parts_.Find(part) == nullptr) {
+    if (const auto dropped = parts_.Insert(part, PartCollector())) {
+      monitor_.ReportError(
+          Fail(ErrorCode::kUntrusted, "part {} never finished and is dropped", dropped->first));
+      assembler_.Forget(dropped->first);
+    }
+  }
+  return parts_.Find(part);
+}
+
+// A part that arrives after the end of the scan of the last one with its number is another part: the line
+// counts from the beginning again.
+void FusionService::OnArrived(const fsmsg::part_arrived_t& arrived) {
+  const std::int64_t* finished_utime = finished_.Find(arrived.part);
+  if (finished_utime != nullptr && arrived.utime > *finished_utime) {
+    finished_.Take(arrived.part);
+  }
+  if (PartCollector* part = Part(arrived.part)) {
+    part->OnArrived(arrived);
+    FinishIfSettled(arrived.part);
+  }
+}
+
+void FusionService::OnViewReady(const fsmsg::view_ready_t& ready) {
+  const double change_k = std::abs(ready.robot_body_degc - matrices_.recorded_body_degc);
+  if (change_k <= config_.max_body_change_k) {  // not so for NaN
+    return;
+  }
+  const std::string reason = fmt::format(
+      "the robot's body has {:.1f} degC, {:.1f} degC when the view matrices were taught, allowed are {} K",
+      ready.robot_body_degc, matrices_.recorded_body_degc, config_.max_body_change_k);
+  monitor_.Count("views_off_temperature");
+  monitor_.ReportError(Fail(ErrorCode::kUntrusted, "part {} view {}: {}", ready.part, ready.view, reason));
+  PartCollector* part = config_.body_change_voids ? Part(ready.part) : nullptr;
+  if (part != nullptr) {
+    part->SetViewVoid(ready.view, reason);
+  }
 }
 
 void FusionService::OnCloudSlice(const fsmsg::cloud_slice_t& slice) {
+  PartCollector* part = Part(slice.part);
+  if (part == nullptr) {
+    return;
+  }
   Result<std::optional<PointCloud>> cloud = assembler_.Add(slice);
   if (!cloud.ok()) {
     monitor_.ReportError(cloud.error());
   } else if (cloud->has_value()) {
-    Part(slice.part).OnCloud(slice.view, std::move(**cloud));
+    part->OnCloud(slice.view, std::move(**cloud));
     FinishIfSettled(slice.part);
   }
 }
 
 void FusionService::OnScanComplete(const fsmsg::scan_complete_t& scan) {
-  Part(scan.part).OnScanComplete(scan);
+  PartCollector* collector = Part(scan.part);
+  if (collector == nullptr) {
+    return;
+  }
+  collector->OnScanComplete(scan);
   const auto timeout_us = static_cast<std::int64_t>(config_.view_timeout_s * 1e6);
-  hub_.bus().At(hub_.bus().NowUs() + timeout_us, [this, part = scan.part] {
-    if (const auto found = parts_.find(part); found != parts_.end()) {
-      found->second.Expire(fmt::format("no result within {} s of the scan", config_.view_timeout_s));
+  hub_.bus().At(hub_.bus().NowUs() + timeout_us, [this, part = scan.part, utime = scan.utime] {
+    PartCollector* late = parts_.Find(part);
+    if (late != nullptr && late->scan().has_value() && late->scan()->utime == utime) {
+      late->Expire(fmt::format("no result within {} s of the scan", config_.view_timeout_s));
       FinishIfSettled(part);
     }
   });
@@ -72,11 +122,12 @@ void FusionService::OnScanComplete(const fsmsg::scan_complete_t& scan) {
 }
 
 void FusionService::FinishIfSettled(int part) {
-  const auto found = parts_.find(part);
-  if (found != parts_.end() && found->second.Settled()) {
-    Finish(part, found->second);
-    parts_.erase(found);
+  const PartCollector* collector = parts_.Find(part);
+  if (collector != nullptr && collector->Settled()) {
+    auto settled = parts_.Take(part);
+    finished_.Insert(part, settled->scan()->utime);
     assembler_.Forget(part);
+    Finish(part, *settled);
   }
 }
 
@@ -104,7 +155,7 @@ void FusionService::Finish(int part, PartCollector& collector) {
   const StepTimer timer(hub_, "fusion", part, kAllViews);
   PartCollector::Views views = collector.TakeViews();
   fsmsg::fusion_result_t result{};
-  result.utime = views.last_utime;
+  result.utime = views.scan_utime;
   result.part = part;
   result.reason = VoidReason(collector, views);
   result.reference_degc = config_.reference_temperature_degc;

@@ -1,9 +1,9 @@
 // The fusion service: one fused cloud a part, or the reason why there is none.
 #pragma once
 
-#include <map>
-
+#include "fsmsg/view_ready_t.hpp"
 #include "services/common/bus/cloud_stream.h"
+#include "services/common/service/aged_map.h"
 #include "services/common/service/service_monitor.h"
 #include "services/fusion/fuse.h"
 #include "services/fusion/fusion_config.h"
@@ -17,7 +17,10 @@ class FusionService {
                 ExpansionCurve curve);
 
  private:
-  PartCollector& Part(int part);
+  // Nothing if the part has its result: what still comes of it must not begin it again.
+  PartCollector* Part(int part);
+  void OnArrived(const fsmsg::part_arrived_t& arrived);
+  void OnViewReady(const fsmsg::view_ready_t& ready);
   void OnCloudSlice(const fsmsg::cloud_slice_t& slice);
   void OnScanComplete(const fsmsg::scan_complete_t& scan);
   void FinishIfSettled(int part);
@@ -32,7 +35,8 @@ class FusionService {
   ViewMatrices matrices_;
   ExpansionCurve curve_;
   CloudAssembler assembler_;
-  std::map<int, PartCollector> parts_;  // in work
+  AgedMap<int, PartCollector> parts_;    // in work
+  AgedMap<int, std::int64_t> finished_;  // utime of the end of the scan
 };
 
 }  // namespace forgescan

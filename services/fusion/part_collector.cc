@@ -14,6 +14,9 @@ void PartCollector::OnViewResult(const fsmsg::view_result_t& result) {
 }
 
 std::optional<std::string> PartCollector::VoidReason(const View& view) const {
+  if (view.void_reason.has_value()) {
+    return view.void_reason;
+  }
   if (view.result.has_value() && view.result->status != fsmsg::view_result_t::STATUS_OK) {
     return view.result->reason;
   }
@@ -53,7 +56,7 @@ bool PartCollector::Settled() const {
 
 PartCollector::Views PartCollector::TakeViews() {
   Views taken;
-  taken.last_utime = scan_->utime;
+  taken.scan_utime = scan_->utime;
   for (int k = 0; k < scan_->views_expected; ++k) {
     View& view = views_[k];
     fsmsg::fused_view_t summary{};

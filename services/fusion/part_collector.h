@@ -29,6 +29,8 @@ class PartCollector {
   void OnTemperature(const fsmsg::part_temperature_t& temperature) {
     views_[temperature.view].temperature = temperature;
   }
+  // The view is void for this reason whatever comes of it.
+  void SetViewVoid(int view, const std::string& reason) { views_[view].void_reason = reason; }
   void OnScanComplete(const fsmsg::scan_complete_t& scan) { scan_ = scan; }
   // Views still open become void for this reason.
   void Expire(const std::string& reason) { expired_ = reason; }
@@ -41,7 +43,7 @@ class PartCollector {
   struct Views {
     std::vector<ViewCloud> clouds;
     std::vector<fsmsg::fused_view_t> summary;
-    std::int64_t last_utime = 0;  // of the last view
+    std::int64_t scan_utime = 0;  // of the end of the scan
     int frames_expected = 0;
     int frames_used = 0;
   };
@@ -52,6 +54,7 @@ class PartCollector {
     std::optional<fsmsg::view_result_t> result;
     std::optional<PointCloud> cloud;
     std::optional<fsmsg::part_temperature_t> temperature;
+    std::optional<std::string> void_reason;
   };
   // Why the view is void; empty = it is usable; nothing = still open.
   std::optional<std::string> VoidReason(const View& view) const;

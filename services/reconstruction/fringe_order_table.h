@@ -12,8 +12,8 @@ namespace forgescan {
 
 // Let frequency b be the finest. The differences r_j = phi_j - (L_b / L_j) phi_b (mod 1 turn) depend on the
 // fringe order k alone: r_j = k L_b / L_j. The order with the least cost sum_j (1 - cos(r_j - k L_b / L_j))
-// is tabulated over (r_1, r_2). Periods need not divide the projector's width. Source: PAPER 2.2.1 and the
-// multi-frequency look-up literature; DOMAIN 1.2.
+// is tabulated over (r_1, r_2). Periods need not divide the projector's width. Source: paper, 2.2.1, and the
+// multi-frequency look-up literature; docs/design.md, "Fringe order".
 struct FringeOrderTable {
   static constexpr int kSide = 512;
 

@@ -12,7 +12,7 @@
 namespace forgescan {
 
 // kOwn: each frequency has the frames to solve for its own background. kShared: one background for all
-// frequencies (PAPER 2.2.1: 3-2-2 frames instead of 4-4-4), which only a linear projector allows.
+// frequencies (paper, 2.2.1: 3-2-2 frames instead of 4-4-4), which only a linear projector allows.
 enum class Background { kOwn, kShared };
 
 // Frames I = A + B cos(2 pi (x - origin) / period + shift), x the projector column.

@@ -12,7 +12,7 @@ struct CameraNoise {
   double gain_dn = 0.024;
 };
 
-// Source: DOMAIN notes of the project, sections 1.1 - 1.4.
+// See docs/design.md, "The chain of measurement".
 struct ReconstructionConfig {
   CameraNoise noise;
   double full_scale_16bit_dn = 65535;  // largest grey value of a 16-bit frame (4095 for 12-bit cameras)

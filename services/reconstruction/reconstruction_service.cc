@@ -11,6 +11,9 @@ namespace forgescan {
 namespace {
 
 constexpr std::size_t kMaxViewsInWork = 8;
+constexpr std::size_t kFinishedKept = 64;  // some parts back
+
+std::int64_t ToUs(double seconds) { return static_cast<std::int64_t>(seconds * 1e6); }
 
 std::vector<cv::Mat> Images(const std::vector<const fsmsg::frame_t*>& frames) {
   std::vector<cv::Mat> images;
@@ -46,14 +49,16 @@ ReconstructionService::ReconstructionService(StreamHub& hub, ServiceMonitor& mon
       monitor_(monitor),
       config_(config),
       pattern_(std::move(pattern)),
-      calibration_(std::move(calibration)) {
+      calibration_(std::move(calibration)),
+      views_(kMaxViewsInWork),
+      finished_(kFinishedKept) {
   hub_.Advertise(kViewCloud);
   hub_.Advertise(kViewResult);
   hub_.Advertise(kReconstructionTime);
   hub_.Subscribe<fsmsg::view_captured_t>(kViewCaptured,
                                          [this](const auto& captured) { OnCaptured(captured); });
   const auto on_frame = [this](const fsmsg::frame_t& frame) {
-    if (ViewCollector* view = View(frame.part, frame.view)) {
+    if (ViewCollector* view = View(frame)) {
       view->OnFrame(frame);
       FinishIfSettled({frame.part, frame.view});
     }
@@ -61,7 +66,7 @@ ReconstructionService::ReconstructionService(StreamHub& hub, ServiceMonitor& mon
   hub_.Subscribe<fsmsg::frame_t>(kFrameLeft, on_frame);
   hub_.Subscribe<fsmsg::frame_t>(kFrameRight, on_frame);
   const auto on_manifest = [this](const fsmsg::view_frames_t& manifest) {
-    if (ViewCollector* view = View(manifest.part, manifest.view)) {
+    if (ViewCollector* view = View(manifest)) {
       view->OnManifest(manifest);
       FinishIfSettled({manifest.part, manifest.view});
     }
@@ -71,30 +76,43 @@ ReconstructionService::ReconstructionService(StreamHub& hub, ServiceMonitor& mon
   monitor_.SetState(ServiceState::kReady, "waiting for frames");
 }
 
-ViewCollector* ReconstructionService::View(int part, int view) {
-  const Key key{part, view};
-  const auto found = views_.find(key);
-  if (found != views_.end()) {
-    return &found->second;
+// The rest of a view is exposed and sent within the timeout of its frames; the same numbers later are another
+// part, counted from the beginning again.
+bool ReconstructionService::IsFinished(Key key, int attempt, std::int64_t utime) {
+  const Finished* finished = finished_.Find(key);
+  return finished != nullptr && attempt <= finished->attempt &&
+         utime <= finished->utime + ToUs(config_.frame_timeout_s);
+}
+
+template <typename Message>
+ViewCollector* ReconstructionService::View(const Message& message) {
+  const Key key{message.part, message.view};
+  if (IsFinished(key, message.attempt, message.utime)) {
+    monitor_.Count("messages_late");
+    return nullptr;
   }
-  if (views_.size() >= kMaxViewsInWork) {
-    const Key oldest = views_.begin()->first;
-    monitor_.ReportError(Fail(ErrorCode::kUntrusted, "part {} view {} never finished and is dropped",
-                              oldest.first, oldest.second));
-    views_.erase(views_.begin());
+  if (views_.Find(key) == nullptr) {
+    if (const auto dropped = views_.Insert(key, ViewCollector(pattern_.frame_count()))) {
+      monitor_.ReportError(Fail(ErrorCode::kUntrusted, "part {} view {} never finished and is dropped",
+                                dropped->first.first, dropped->first.second));
+    }
   }
-  return &views_.emplace(key, ViewCollector(pattern_.frame_count())).first->second;
+  return views_.Find(key);
 }
 
 void ReconstructionService::OnCaptured(const fsmsg::view_captured_t& captured) {
+  ViewCollector* view = View(captured);
+  if (view == nullptr) {
+    return;
+  }
   const Key key{captured.part, captured.view};
-  View(captured.part, captured.view)->OnCaptured(captured);
-  const auto timeout_us = static_cast<std::int64_t>(config_.frame_timeout_s * 1e6);
+  view->OnCaptured(captured);
+  const std::int64_t timeout_us = ToUs(config_.frame_timeout_s);
   hub_.bus().At(hub_.bus().NowUs() + timeout_us, [this, key, attempt = captured.attempt] {
-    const auto found = views_.find(key);
-    if (found != views_.end() && found->second.attempt() == attempt) {
-      found->second.Expire(fmt::format("{} of {} frames came within {} s", found->second.frames_received(),
-                                       2 * pattern_.frame_count(), config_.frame_timeout_s));
+    ViewCollector* late = views_.Find(key);
+    if (late != nullptr && late->attempt() == attempt) {
+      late->Expire(fmt::format("{} of {} frames came within {} s", late->frames_received(),
+                               2 * pattern_.frame_count(), config_.frame_timeout_s));
       FinishIfSettled(key);
     }
   });
@@ -102,10 +120,11 @@ void ReconstructionService::OnCaptured(const fsmsg::view_captured_t& captured) {
 }
 
 void ReconstructionService::FinishIfSettled(Key key) {
-  const auto found = views_.find(key);
-  if (found != views_.end() && found->second.state() != ViewCollector::State::kCollecting) {
-    const auto node = views_.extract(found);
-    Finish(key, node.mapped());
+  const ViewCollector* view = views_.Find(key);
+  if (view != nullptr && view->state() != ViewCollector::State::kCollecting) {
+    const auto settled = views_.Take(key);
+    finished_.Insert(key, {settled->attempt(), hub_.bus().NowUs()});
+    Finish(key, *settled);
   }
 }
 

@@ -1,12 +1,12 @@
 // The reconstruction service: frames of a view in, its points or the reason why there are none out.
 #pragma once
 
-#include <map>
 #include <memory>
 #include <utility>
 
 #include "fsmsg/view_result_t.hpp"
 #include "services/common/config/config.h"
+#include "services/common/service/aged_map.h"
 #include "services/common/service/service_monitor.h"
 #include "services/reconstruction/reconstruct.h"
 #include "services/reconstruction/view_collector.h"
@@ -31,7 +31,16 @@ class ReconstructionService {
  private:
   using Key = std::pair<int, int>;  // part, view
 
-  ViewCollector* View(int part, int view);
+  // A view that has its result. What still comes of it must not begin it again.
+  struct Finished {
+    int attempt = 0;
+    std::int64_t utime = 0;
+  };
+
+  // The view a message belongs to; nothing if that view is finished.
+  template <typename Message>
+  ViewCollector* View(const Message& message);
+  bool IsFinished(Key key, int attempt, std::int64_t utime);
   void OnCaptured(const fsmsg::view_captured_t& captured);
   void FinishIfSettled(Key key);
   void Finish(Key key, const ViewCollector& view);
@@ -45,7 +54,8 @@ class ReconstructionService {
   StereoCalibration calibration_;
   std::unique_ptr<Reconstructor> reconstructor_;  // made with the first view, when the image size is known
   ImageSize image_size_{};                        // for which it was made
-  std::map<Key, ViewCollector> views_;            // in work
+  AgedMap<Key, ViewCollector> views_;             // in work
+  AgedMap<Key, Finished> finished_;
 };
 
 }  // namespace forgescan

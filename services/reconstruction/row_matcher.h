@@ -23,7 +23,7 @@ struct RowMatch {
   std::vector<MatchOutcome> outcome;  // one a pixel; kNone where there is no coordinate
 };
 
-// Reused from row to row; one per thread. Source: DOMAIN 1.4, stereo.
+// Reused from row to row; one per thread. See docs/design.md, "Stereo".
 class RowMatcher {
  public:
   // coordinate_count: coordinates are searched in 0..coordinate_count px.

@@ -21,8 +21,8 @@ struct Triangulation {
 
 // sigma_mm = Z^2 / (b f) * sigma of the disparity, times ray length over depth: along the view ray. Normals
 // come from the gradient of the disparity (a plane's is constant) over (2 normal_radius_px + 1)^2 pixels,
-// steps in depth left out. left: its coordinates, for the projector check. Source: DOMAIN 1.1 and 1.4.
-// Frames: see StereoRig.
+// steps in depth left out. left: its coordinates, for the projector check. See docs/design.md, "Coordinate,
+// and how sure" and "Stereo". Frames: see StereoRig.
 Triangulation Triangulate(const DisparityMap& map, const RectifiedView& left, const StereoRig& rig,
                           const ReconstructionConfig& config);
 

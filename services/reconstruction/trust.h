@@ -22,7 +22,8 @@ struct TrustFigures {
 
 // From about 20,000 pixels on a regular grid. The 2nd harmonic is the least-squares fit of B cos(2 phi +
 // psi), one ratio and one psi for the view, to what the phase model leaves of the frames; for 4 own frames I1
-// + I3 - I2 - I4 = 4 B2 cos(2 phi). Source: DOMAIN 1.3. Errors: kDegenerate when no pixel is lit.
+// + I3 - I2 - I4 = 4 B2 cos(2 phi). See docs/design.md, "Masks and refusals". Errors: kDegenerate when no
+// pixel is lit.
 Result<TrustFigures> MeasureTrust(std::span<const cv::Mat> frames, const DecodedView& view,
                                   const FringeDecoder& decoder, const ReconstructionConfig& config);
 

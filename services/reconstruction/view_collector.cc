@@ -25,9 +25,22 @@ void ViewCollector::SetVoid(const std::string& reason) {
   }
 }
 
+void ViewCollector::CheckPatterns(int fired) {
+  if (fired != frames_per_camera_) {
+    SetVoid(
+        fmt::format("the trigger fires {} patterns a view ([trigger] patterns), pattern.toml lists {} frames",
+                    fired, frames_per_camera_));
+  }
+}
+
 void ViewCollector::OnCaptured(const fsmsg::view_captured_t& captured) {
-  if (IsCurrent(captured.attempt) && captured.status != fsmsg::view_captured_t::STATUS_CAPTURED) {
-    SetVoid(captured.reason);
+  if (!IsCurrent(captured.attempt)) {
+    return;
+  }
+  if (captured.status != fsmsg::view_captured_t::STATUS_CAPTURED) {
+    SetVoid(captured.reason.empty() ? "the capture is void" : captured.reason);
+  } else {
+    CheckPatterns(captured.pulses_expected);
   }
 }
 
@@ -37,8 +50,9 @@ void ViewCollector::OnManifest(const fsmsg::view_frames_t& manifest) {
     return;
   }
   camera->manifest = manifest;
+  CheckPatterns(manifest.frames_expected);
   if (manifest.frames_missing > 0) {
-    SetVoid(manifest.reason);
+    SetVoid(manifest.reason.empty() ? "frames are missing" : manifest.reason);
   } else if (manifest.frames_sent != frames_per_camera_) {
     SetVoid(fmt::format("a camera sent {} frames, the sequence has {}", manifest.frames_sent,
                         frames_per_camera_));

@@ -51,6 +51,8 @@ class ViewCollector {
   bool IsCurrent(int attempt);
   Camera* CameraOf(int camera);
   void SetVoid(const std::string& reason);
+  // fired: pulses of each camera as the trigger counts them.
+  void CheckPatterns(int fired);
 
   int frames_per_camera_;
   int attempt_ = 0;

@@ -12,6 +12,7 @@ namespace forgescan {
 struct RegistrationConfig {
   IcpOptions icp;
   ClassifyOptions classify;
+  double cloud_timeout_s = 15.0;  // from a fusion's result to the last slice of its cloud
   // Pre-calibrated start (paper 2.2.2): where a part lies on average. Frames: model and array. mm.
   Eigen::Isometry3d model_from_array = Eigen::Isometry3d::Identity();
 

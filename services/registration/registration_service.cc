@@ -37,7 +37,7 @@ Message NoPose(const fsmsg::fusion_result_t& fusion) {
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   std::fill(std::begin(message.model_from_array), std::end(message.model_from_array), kNone);
   message.rms_mm = message.inlier_share = message.foreign_share = message.shift_mm = kNone;
-  message.turn_rad = message.weakest_ratio = kNone;
+  message.turn_rad = message.weakest_eigenvalue = kNone;
   return message;
 }
 
@@ -45,20 +45,33 @@ Message NoPose(const fsmsg::fusion_result_t& fusion) {
 
 RegistrationService::RegistrationService(StreamHub& hub, ServiceMonitor& monitor, RegistrationConfig config,
                                          RegistrationModel model)
-    : hub_(hub), monitor_(monitor), config_(std::move(config)), model_(std::move(model)) {
+    : hub_(hub),
+      monitor_(monitor),
+      config_(std::move(config)),
+      model_(std::move(model)),
+      parts_(kMaxPartsInWork) {
   hub_.Advertise(kRegisteredCloud);
   hub_.Advertise(kRegistration);
   hub_.Advertise(kRegistrationTime);
   hub_.Subscribe<fsmsg::cloud_slice_t>(kFusedCloud, [this](const auto& slice) { OnSlice(slice); });
-  hub_.Subscribe<fsmsg::fusion_result_t>(kFusionResult, [this](const auto& fusion) {
-    parts_[fusion.part].fusion = fusion;
-    FinishIfComplete(fusion.part);
-  });
+  hub_.Subscribe<fsmsg::fusion_result_t>(kFusionResult, [this](const auto& fusion) { OnFusion(fusion); });
   hub_.OnLost(kFusedCloud, [this](std::int64_t first, std::int64_t last) {
+    lost_ = fmt::format("; slices {} to {} of the fused clouds are lost", first, last);
     monitor_.ReportError(
         Fail(ErrorCode::kUnavailable, "slices {} to {} of the fused clouds are lost", first, last));
   });
   monitor_.SetState(ServiceState::kReady, "waiting for a part");
+}
+
+RegistrationService::Part& RegistrationService::InWork(int part) {
+  if (parts_.Find(part) == nullptr) {
+    if (const auto dropped = parts_.Insert(part, Part())) {
+      monitor_.ReportError(
+          Fail(ErrorCode::kUntrusted, "part {} never became complete and is dropped", dropped->first));
+      assembler_.Forget(dropped->first);
+    }
+  }
+  return *parts_.Find(part);
 }
 
 void RegistrationService::OnSlice(const fsmsg::cloud_slice_t& slice) {
@@ -67,28 +80,47 @@ void RegistrationService::OnSlice(const fsmsg::cloud_slice_t& slice) {
     return monitor_.ReportError(cloud.error());
   }
   if (cloud->has_value()) {
-    parts_[slice.part].cloud_in_array = std::move(**cloud);
+    InWork(slice.part).cloud_in_array = std::move(**cloud);
     FinishIfComplete(slice.part);
   }
 }
 
+void RegistrationService::OnFusion(const fsmsg::fusion_result_t& fusion) {
+  InWork(fusion.part).fusion = fusion;
+  FinishIfComplete(fusion.part);
+  const auto timeout_us = static_cast<std::int64_t>(config_.cloud_timeout_s * 1e6);
+  hub_.bus().At(hub_.bus().NowUs() + timeout_us, [this, part = fusion.part, utime = fusion.utime] {
+    const Part* late = parts_.Find(part);
+    if (late != nullptr && late->fusion.has_value() && late->fusion->utime == utime) {
+      GiveUp(part);
+    }
+  });
+}
+
+void RegistrationService::GiveUp(int part) {
+  const auto taken = parts_.Take(part);
+  assembler_.Forget(part);
+  Message message = NoPose(*taken->fusion);
+  message.status = Message::STATUS_FAILED;
+  message.reason =
+      fmt::format("the fused cloud is not whole {} s after its result{}", config_.cloud_timeout_s, lost_);
+  if (const Status sent = Publish(message, {}); !sent.ok()) {
+    monitor_.ReportError(sent.error());
+  }
+}
+
 void RegistrationService::FinishIfComplete(int part) {
-  while (parts_.size() > kMaxPartsInWork) {
-    monitor_.ReportError(
-        Fail(ErrorCode::kUntrusted, "part {} never became complete and is dropped", parts_.begin()->first));
-    assembler_.Forget(parts_.begin()->first);
-    parts_.erase(parts_.begin());
-  }
-  const auto found = parts_.find(part);
-  if (found == parts_.end() || !found->second.fusion.has_value()) {
+  const Part* found = parts_.Find(part);
+  if (found == nullptr || !found->fusion.has_value()) {
     return;
   }
-  const bool has_cloud = found->second.fusion->status == fsmsg::view_result_t::STATUS_OK;
-  if (has_cloud && !found->second.cloud_in_array.has_value()) {
+  const bool has_cloud = found->fusion->status == fsmsg::view_result_t::STATUS_OK;
+  if (has_cloud && !found->cloud_in_array.has_value()) {
     return;
   }
-  const auto node = parts_.extract(found);
-  Finish(*node.mapped().fusion, node.mapped().cloud_in_array.value_or(PointCloud()));
+  const auto taken = parts_.Take(part);
+  lost_.clear();  // whatever it was, it did not hold up this part
+  Finish(*taken->fusion, taken->cloud_in_array.value_or(PointCloud()));
 }
 
 PointCloud RegistrationService::Register(const PointCloud& cloud_in_array, Message& message) const {
@@ -109,7 +141,7 @@ PointCloud RegistrationService::Register(const PointCloud& cloud_in_array, Messa
       1.0 - static_cast<double>(part_points.size()) / static_cast<double>(cloud_in_array.size());
   message.shift_mm = registration->correction_mm;
   message.turn_rad = registration->correction_rad;
-  message.weakest_ratio = registration->weakest_eigenvalue;
+  message.weakest_eigenvalue = registration->weakest_eigenvalue;
   return MovePoints(cloud_in_array, part_points, pose);
 }
 

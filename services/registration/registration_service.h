@@ -1,12 +1,13 @@
 // The registration service: where the part lies, with the foreign points taken out, or why that is not known.
 #pragma once
 
-#include <map>
 #include <optional>
+#include <string>
 
 #include "fsmsg/fusion_result_t.hpp"
 #include "fsmsg/registration_t.hpp"
 #include "services/common/bus/cloud_stream.h"
+#include "services/common/service/aged_map.h"
 #include "services/common/service/service_monitor.h"
 #include "services/registration/registration_config.h"
 
@@ -23,8 +24,12 @@ class RegistrationService {
     std::optional<fsmsg::fusion_result_t> fusion;
   };
 
+  Part& InWork(int part);
+  void OnFusion(const fsmsg::fusion_result_t& fusion);
   void OnSlice(const fsmsg::cloud_slice_t& slice);
   void FinishIfComplete(int part);
+  // The part's cloud did not come in time: says so, instead of nothing.
+  void GiveUp(int part);
   void Finish(const fsmsg::fusion_result_t& fusion, const PointCloud& cloud_in_array);
   // Fills the message from a registration, or with the reason why there is none; returns the part's points.
   PointCloud Register(const PointCloud& cloud_in_array, fsmsg::registration_t& message) const;
@@ -35,7 +40,8 @@ class RegistrationService {
   RegistrationConfig config_;
   RegistrationModel model_;
   CloudAssembler assembler_;
-  std::map<int, Part> parts_;  // in work
+  AgedMap<int, Part> parts_;  // in work
+  std::string lost_;          // the last slices the bus gave up; empty = none
 };
 
 }  // namespace forgescan

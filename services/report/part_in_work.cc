@@ -42,7 +42,7 @@ ReportedRegistration Reported(const fsmsg::registration_t& from, bool converged)
                           from.foreign_share,
                           from.shift_mm,
                           from.turn_rad,
-                          from.weakest_ratio,
+                          from.weakest_eigenvalue,
                           {}};
   if (converged) {
     to.model_from_array.assign(std::begin(from.model_from_array), std::end(from.model_from_array));

@@ -26,7 +26,7 @@ struct ReportedRegistration {
   double foreign_share = kNotKnown;
   double shift_mm = kNotKnown;
   double turn_rad = kNotKnown;
-  double weakest_ratio = kNotKnown;
+  double weakest_eigenvalue = kNotKnown;
   std::vector<double> model_from_array;  // row-major 4x4, mm; empty unless converged
 };
 

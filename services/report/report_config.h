@@ -7,7 +7,8 @@
 namespace forgescan {
 
 struct ReportConfig {
-  double part_timeout_s = 90.0;     // from the first word of a part to its verdict, whatever is missing
+  double part_timeout_s =
+      180.0;  // from the first word of a part to its verdict; above scan, fusion and registration
   double loss_settle_s = 2.0;       // from a lost message to the verdict on parts that wait for it
   double page_delay_s = 0.5;        // from the verdict to the page: durations that come late still get on it
   int trend_parts = 25;             // last parts drawn and fitted

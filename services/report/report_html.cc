@@ -161,7 +161,7 @@ std::string Registration(const ReportedRegistration& from) {
                      Figure("Foreign points removed", Percent(from.foreign_share)) +
                      Figure("Shift against the expected place", WithUnit(from.shift_mm, 3, "mm")) +
                      Figure("Turn against the expected place", WithUnit(1000.0 * from.turn_rad, 3, "mrad")) +
-                     Figure("Weakest direction", NumberText(from.weakest_ratio, 4));
+                     Figure("Weakest direction", NumberText(from.weakest_eigenvalue, 4));
   const std::string remark = from.reason.empty() ? "" : "<p>" + EscapeHtml(from.reason) + "</p>";
   return Section("Alignment to the design model", "<table><tbody>" + rows + "</tbody></table>" + remark);
 }

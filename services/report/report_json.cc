@@ -44,7 +44,7 @@ Json Registration(const ReportedRegistration& from) {
           {"foreign_share", Number(from.foreign_share)},
           {"shift_mm", Number(from.shift_mm)},
           {"turn_rad", Number(from.turn_rad)},
-          {"weakest_ratio", Number(from.weakest_ratio)},
+          {"weakest_eigenvalue", Number(from.weakest_eigenvalue)},
           {"model_from_array", std::move(matrix)}};
 }
 

@@ -17,7 +17,8 @@ struct RobotConfig {
   int sort_echo_timeout_ms = 100;
   int sort_resends = 3;
   double gate_timeout_s = 3;
-  double cooling_timeout_s = 5;  // without a cooling state for so long no part is inspected; 0: not watched
+  double cooling_timeout_s =
+      5;  // without a cooling state for so long, or from the start, no part is inspected; 0: not watched
 
   // Errors: kInvalidArgument, naming the field and its range.
   Status Check() const;

@@ -69,8 +69,9 @@ void RobotService::Subscribe() {
   hub_.Subscribe<fsmsg::verdict_t>(kVerdict, [this](const fsmsg::verdict_t& m) { OnVerdict(m); });
   SubscribeState<fsmsg::cooling_state_t>(hub_.bus(), kCoolingState, [this](const fsmsg::cooling_state_t& m) {
     last_cooling_us_ = Now();
-    Do(machine_.OnInterlock(m.interlock >= fsmsg::cooling_state_t::INTERLOCK_STOP_INSPECTION, m.reason,
-                            Now()));
+    const bool free = m.interlock == fsmsg::cooling_state_t::INTERLOCK_CLEAR ||
+                      m.interlock == fsmsg::cooling_state_t::INTERLOCK_WARN;  // UNKNOWN stops
+    Do(machine_.OnInterlock(!free, m.reason, Now()));
   });
 }
 

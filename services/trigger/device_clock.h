@@ -13,7 +13,9 @@ class DeviceClock {
   // so the smallest difference of the last 64 is the offset: at 10 Hz and 50 ppm of drift the error stays
   // below 0.4 ms.
   void OnStatus(std::uint32_t device_time_us, std::int64_t arrival_utime);
-  // The device restarted.
+  // A status whose time goes back, or runs ahead of its arrival: the device was started again since the last
+  // one. To be asked before OnStatus().
+  bool HasRestarted(std::uint32_t device_time_us, std::int64_t arrival_utime) const;
   void Reset() { *this = DeviceClock(); }
 
   // 64-bit device time nearest to the last status; nothing before the first status.
@@ -23,6 +25,7 @@ class DeviceClock {
  private:
   bool started_ = false;
   std::int64_t last_unwrapped_us_ = 0;
+  std::int64_t last_arrival_us_ = 0;
   std::deque<std::int64_t> offsets_us_;
 };
 

@@ -52,13 +52,17 @@ TriggerMachine::Actions TriggerMachine::Void(const std::string& reason, std::int
   return actions;
 }
 
-TriggerMachine::Actions TriggerMachine::OnLink(bool up, std::int64_t now_us) {
+TriggerMachine::Actions TriggerMachine::Forget(const std::string& reason, std::int64_t now_us) {
   const bool was_active = active();
-  link_up_ = up;
   phase_ = TriggerPhase::kOffline;  // idle begins with the first status
   clock_.Reset();
   pulse_count_ = {};
-  return was_active ? Void("the trigger microcontroller stopped answering", now_us) : Actions{};
+  return was_active ? Void(reason, now_us) : Actions{};
+}
+
+TriggerMachine::Actions TriggerMachine::OnLink(bool up, std::int64_t now_us) {
+  link_up_ = up;
+  return Forget("the trigger microcontroller stopped answering", now_us);
 }
 
 TriggerMachine::Actions TriggerMachine::OnViewReady(const ViewRequest& request, std::int64_t now_us) {
@@ -106,6 +110,12 @@ void TriggerMachine::Accept(std::int64_t now_us) {
 }
 
 TriggerMachine::Actions TriggerMachine::OnStatus(const TriggerStatus& status) {
+  Actions actions;
+  if (clock_.HasRestarted(status.device_time_us, status.utime)) {
+    const std::string reason = "the trigger microcontroller was started again";
+    actions = Forget(reason, status.utime);
+    actions.emplace_back(TriggerNote{reason});
+  }
   clock_.OnStatus(status.device_time_us, status.utime);
   if (link_up_ && phase_ == TriggerPhase::kOffline) {
     seq_ = status.seq_echo;  // commands go on from its number: one it has had before would be taken for a
@@ -115,7 +125,7 @@ TriggerMachine::Actions TriggerMachine::OnStatus(const TriggerStatus& status) {
   if (phase_ == TriggerPhase::kArming && status.seq_echo == seq_) {
     Accept(status.utime);
   }
-  return {};
+  return actions;
 }
 
 bool TriggerMachine::Complete() const {

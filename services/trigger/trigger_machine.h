@@ -3,7 +3,7 @@
 //
 //   offline --link up, first status--> idle --view ready--> arming --echo--> firing --all records--> idle
 //   arming: no echo after the resends, firing: records missing at the deadline, position lost, interlock ->
-//   void, idle any: link lost -> void if a view was under way, offline
+//   void, idle any: link lost, device started again -> void if a view was under way, offline
 #pragma once
 
 #include <array>
@@ -76,6 +76,8 @@ class TriggerMachine {
   bool active() const { return phase_ == TriggerPhase::kArming || phase_ == TriggerPhase::kFiring; }
   TriggerCommand Command(TriggerMode mode) const;
   ViewOutcome Outcome(std::int64_t utime) const;
+  // Clock and pulse numbers begin again with the next status.
+  Actions Forget(const std::string& reason, std::int64_t now_us);
   Actions Void(const std::string& reason, std::int64_t now_us);
   void Accept(std::int64_t now_us);
   bool Complete() const;

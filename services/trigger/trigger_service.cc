@@ -26,8 +26,9 @@ TriggerService::TriggerService(StreamHub& hub, ServiceMonitor& monitor, Trigger&
     Do(machine_.OnPosition(m.in_position != 0, Now()));
   });
   SubscribeState<fsmsg::cooling_state_t>(hub_.bus(), kCoolingState, [this](const fsmsg::cooling_state_t& m) {
-    Do(machine_.OnInterlock(m.interlock >= fsmsg::cooling_state_t::INTERLOCK_STOP_INSPECTION, m.reason,
-                            Now()));
+    const bool free = m.interlock == fsmsg::cooling_state_t::INTERLOCK_CLEAR ||
+                      m.interlock == fsmsg::cooling_state_t::INTERLOCK_WARN;  // UNKNOWN stops
+    Do(machine_.OnInterlock(!free, m.reason, Now()));
   });
   device_.SetHandler([this](const TriggerEvent& event) { OnEvent(event); });
   timer_ = hub_.bus().Every(kStepPeriod_us, [this] {

@@ -17,7 +17,7 @@ constexpr int kThreads = 2;
 const fs::path kStation = FORGESCAN_SOURCE_DIR "/stations/virtual";
 
 Status WriteFiles(const CellConfig& config, const fs::path& folder) {
-  RETURN_IF_ERROR(WriteStation(config, PatternSet::kReduced, folder.string()));
+  RETURN_IF_ERROR(WriteStation(config, ProjectedSet::kReduced, folder.string()));
   std::error_code problem;
   fs::copy_file(kStation / "station.toml", folder / "station.toml", fs::copy_options::overwrite_existing,
                 problem);
@@ -33,7 +33,7 @@ Status WriteFiles(const CellConfig& config, const fs::path& folder) {
 
 struct RenderedCell::Cell {
   explicit Cell(CellConfig config)
-      : cell(std::move(config), kThreads), patterns(cell.Patterns(PatternSet::kReduced)) {}
+      : cell(std::move(config), kThreads), patterns(cell.Patterns(ProjectedSet::kReduced)) {}
   VirtualCell cell;
   std::vector<Pattern> patterns;
 };

@@ -1,6 +1,6 @@
 // The virtual cell as the whole-line tests need it: the station's files, and the images and truth of its
-// parts, rendered at a quarter of the size (612 x 512 px), once for all tests of a program. Its header keeps
-// the simulator apart from the services: both have a RobotConfig and a PatternSet of their own.
+// parts, rendered at a quarter of the size (612 x 512 px), once for all tests of a program. Its header names
+// nothing of the simulator.
 #pragma once
 
 #include <array>

@@ -50,6 +50,7 @@ SimLine::SimLine(RenderedCell& cell, int parts) : cell_(cell), robot_(RobotOf(ce
     hosts_[name] = std::make_unique<Host>(network_, name);
   }
   CameraSimOptions camera;
+  camera.exposure_us = TriggerConfig{}.exposure_us;  // as the station orders it
   camera.width_px = cell.width_px();
   camera.height_px = cell.height_px();
   cameras_ = {std::make_unique<CameraSim>(camera), std::make_unique<CameraSim>(camera)};

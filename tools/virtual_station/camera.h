@@ -15,7 +15,7 @@ struct Lens {
   std::array<double, 5> distortion{};  // k1, k2, p1, p2, k3
 };
 
-struct Camera {
+struct PinholeCamera {
   Lens lens;
   int width_px = 0, height_px = 0;
   Eigen::Isometry3d camera_from_rig = Eigen::Isometry3d::Identity();
@@ -23,12 +23,12 @@ struct Camera {
 
 // The projector is a camera that sends light: same model, same direction of the projection.
 struct Rig {
-  Camera left, right, projector;
+  PinholeCamera left, right, projector;
 };
 
 enum class Side { kLeft, kRight };
 
-inline const Camera& CameraOf(const Rig& rig, Side side) {
+inline const PinholeCamera& CameraOf(const Rig& rig, Side side) {
   return side == Side::kLeft ? rig.left : rig.right;
 }
 

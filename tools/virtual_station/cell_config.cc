@@ -68,7 +68,7 @@ Status ReadRig(const File& file, int scale_divisor, CellConfig& config) {
   ASSIGN_OR_RETURN(config.rig.left.lens, ReadLens(file, "camera_left", 1.0 / divisor));
   ASSIGN_OR_RETURN(config.rig.right.lens, ReadLens(file, "camera_right", 1.0 / divisor));
   ASSIGN_OR_RETURN(config.rig.projector.lens, ReadLens(file, "projector", 1.0));
-  for (Camera* camera : {&config.rig.left, &config.rig.right}) {
+  for (PinholeCamera* camera : {&config.rig.left, &config.rig.right}) {
     camera->width_px = kCameraWidthPx / divisor;
     camera->height_px = kCameraHeightPx / divisor;
   }
@@ -120,9 +120,9 @@ Result<HeatConfig> ReadHeat(const File& file) {
   return heat;
 }
 
-Result<RobotConfig> ReadRobot(const File& file) {
+Result<RobotScatter> ReadRobot(const File& file) {
   TomlSection s = file.Section("robot");
-  RobotConfig robot{};
+  RobotScatter robot{};
   robot.position_sd_mm = s.Number("position_sd_mm", {0, 1});
   robot.rotation_sd_rad = s.Number("rotation_sd_rad", {0, 0.01});
   robot.marker_sd_mm = s.Number("marker_sd_mm", {0, 1});

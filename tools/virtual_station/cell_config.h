@@ -31,7 +31,7 @@ struct HeatConfig {
   double pyrometer_bias_sd_k, pyrometer_noise_sd_k;
 };
 
-struct RobotConfig {
+struct RobotScatter {
   double position_sd_mm, rotation_sd_rad;  // per axis and visit
   double marker_sd_mm;                     // of a reconstructed marker, per axis, when a view is taught
   int markers;                             // per view
@@ -90,7 +90,7 @@ struct CellConfig {
   Rig rig;  // true; scaled to the image size asked for
   PartConfig part;
   HeatConfig heat;
-  RobotConfig robot;
+  RobotScatter robot;
   CalibrationErrorConfig calibration_error;
   ProjectorLightConfig projector_light;
   SensorConfig sensor;

@@ -166,7 +166,7 @@ class Mapper {
     traced.depth_mm = static_cast<float>(to_camera.norm());
     const Eigen::Vector3d p_in_projector = projector_from_array_ * p_in_array;
     const Eigen::Vector2d pixel = Project(request_.rig.projector.lens, p_in_projector);
-    const Camera& projector = request_.rig.projector;
+    const PinholeCamera& projector = request_.rig.projector;
     const bool in_field = p_in_projector.z() > 0.0 && pixel.x() >= -0.5 &&
                           pixel.x() < projector.width_px - 0.5 && pixel.y() >= -0.5 &&
                           pixel.y() < projector.height_px - 0.5;
@@ -220,7 +220,7 @@ class Mapper {
   const PosedScene& scene_;
   const MapRequest& request_;
   const Shader shader_;
-  const Camera& camera_;
+  const PinholeCamera& camera_;
   const Eigen::Isometry3d array_from_camera_, projector_from_array_;
   const Eigen::Vector3d camera_centre_, projector_centre_;
   GeometryMap map_;

@@ -48,7 +48,7 @@ struct RayTable {
   int width = 0, height = 0;
   std::vector<Eigen::Vector2f> ray;
 };
-RayTable BuildRayTable(const Camera& camera, int threads);
+RayTable BuildRayTable(const PinholeCamera& camera, int threads);
 
 // A pixel on an outline of part, cell or shadow: four samples, of equal weight.
 struct EdgePixel {

@@ -5,7 +5,7 @@
 
 namespace forgescan {
 
-std::vector<Pattern> ProjectedPatterns(const ProjectorLightConfig& light, PatternSet set) {
+std::vector<Pattern> ProjectedPatterns(const ProjectorLightConfig& light, ProjectedSet set) {
   const auto period = [&](std::size_t i) { return light.unambiguous_px / light.fringe_counts[i]; };
   std::vector<Pattern> patterns;
   const auto add = [&](std::size_t frequency, int steps) {
@@ -13,7 +13,7 @@ std::vector<Pattern> ProjectedPatterns(const ProjectorLightConfig& light, Patter
       patterns.push_back({period(frequency), 90.0 * i});
     }
   };
-  if (set == PatternSet::kReduced) {
+  if (set == ProjectedSet::kReduced) {
     add(1, 2);
     add(0, 3);
     add(2, 2);

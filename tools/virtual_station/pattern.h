@@ -16,14 +16,14 @@ struct Pattern {
   double shift_deg = 0.0;
 };
 
-enum class PatternSet {
+enum class ProjectedSet {
   kReduced,  // 3 + 2 + 2 sinusoids on one background, then white
   kFull,     // 4 + 4 + 4 sinusoids, then white
 };
 
 // In the order of projection. The reduced set has its three-step frequency in the middle, where a slow drift
 // of the light disturbs least, and the reference last.
-std::vector<Pattern> ProjectedPatterns(const ProjectorLightConfig& light, PatternSet set);
+std::vector<Pattern> ProjectedPatterns(const ProjectorLightConfig& light, ProjectedSet set);
 
 // Light at projector coordinate u, fraction of white: the pattern after the projector's remaining
 // non-linearity, the lens blur and the black level. Independent of u for white.

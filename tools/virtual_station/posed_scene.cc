@@ -46,7 +46,7 @@ Eigen::Vector3d PosedScene::Meet(int triangle, const Eigen::Vector3d& origin,
   return origin + direction * ((plane.offset - plane.normal.dot(origin)) / plane.normal.dot(direction));
 }
 
-RayTable BuildRayTable(const Camera& camera, int threads) {
+RayTable BuildRayTable(const PinholeCamera& camera, int threads) {
   RayTable table{camera.width_px, camera.height_px, {}};
   table.ray.resize(static_cast<std::size_t>(table.width) * static_cast<std::size_t>(table.height));
   ForEachIndex(table.height, threads, [&](int y) {

@@ -24,8 +24,8 @@ double Seconds() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-PatternSet SetOf(const Arguments& arguments) {
-  return arguments.set == "full" ? PatternSet::kFull : PatternSet::kReduced;
+ProjectedSet SetOf(const Arguments& arguments) {
+  return arguments.set == "full" ? ProjectedSet::kFull : ProjectedSet::kReduced;
 }
 
 void CountPoints(const GeometryMap& map) {

@@ -68,14 +68,14 @@ std::string FrequencyText(const std::vector<Pattern>& patterns, double period_px
 }
 
 // Frequencies in the order of projection, so that the order of listing is the order of the frames.
-std::string PatternText(const CellConfig& config, PatternSet set) {
+std::string PatternText(const CellConfig& config, ProjectedSet set) {
   const ProjectorLightConfig& light = config.projector_light;
   const std::vector<Pattern> patterns = ProjectedPatterns(light, set);
   const Sinusoid first = Measure(light, patterns.front().period_px);
   const double white = PatternLevel(light, patterns.back(), 0.0);
   std::string text = fmt::format(
       "projector_width_px = {}\nbackground = \"{}\"\nreference = \"pattern_{:02}.png\"\n",
-      config.rig.projector.width_px, set == PatternSet::kReduced ? "shared" : "own", patterns.size() - 1);
+      config.rig.projector.width_px, set == ProjectedSet::kReduced ? "shared" : "own", patterns.size() - 1);
   text += fmt::format("reference_contrast = {:.5f}\n", first.amplitude / (white - first.mean));
   double last_period_px = 0.0;
   for (const Pattern& pattern : patterns) {
@@ -89,8 +89,8 @@ std::string PatternText(const CellConfig& config, PatternSet set) {
 }
 
 std::string ViewsText(const CellConfig& config, const std::vector<Eigen::Isometry3d>& array_from_camera) {
-  std::string text = fmt::format("path_crc32 = {}\nrecorded_body_degc = {:.1f}\n",
-                                 PathCrc32(config.views), kRobotTeachingDegc);
+  std::string text = fmt::format("path_crc32 = {}\nrecorded_body_degc = {:.1f}\n", PathCrc32(config.views),
+                                 kRobotTeachingDegc);
   for (std::size_t view = 0; view < array_from_camera.size(); ++view) {
     text += fmt::format("\n[[view]]\nindex = {}\narray_from_camera = [", view);
     for (int i = 0; i < 16; ++i) {
@@ -161,7 +161,7 @@ std::uint32_t PathCrc32(const std::vector<ViewConfig>& views) {
   return libdeflate_crc32(0, path.data(), path.size());
 }
 
-Status WriteStation(const CellConfig& config, PatternSet set, const std::string& directory) {
+Status WriteStation(const CellConfig& config, ProjectedSet set, const std::string& directory) {
   const std::filesystem::path folder(directory);
   RETURN_IF_ERROR(MakeFolders(folder));
   const Rig calibrated = CalibratedRig(config);

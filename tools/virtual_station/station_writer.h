@@ -11,7 +11,7 @@
 namespace forgescan {
 
 // Makes the folders. Cost: about 3 s (the CAD model). Errors: kIo naming the path.
-Status WriteStation(const CellConfig& config, PatternSet set, const std::string& directory);
+Status WriteStation(const CellConfig& config, ProjectedSet set, const std::string& directory);
 
 // CRC-32 of the taught path, as the robot controller reports it: views are bound to it.
 std::uint32_t PathCrc32(const std::vector<ViewConfig>& views);

@@ -73,7 +73,7 @@ Rig CalibratedRig(const CellConfig& config) {
   Disturb(error, scale, random, rig.left.lens);
   Disturb(error, scale, random, rig.right.lens);
   Disturb(error, 1.0, random, rig.projector.lens);
-  for (Camera* device : {&rig.right, &rig.projector}) {
+  for (PinholeCamera* device : {&rig.right, &rig.projector}) {
     device->camera_from_rig =
         SmallMotion(random, error.translation_sd_mm, error.rotation_sd_rad) * device->camera_from_rig;
   }

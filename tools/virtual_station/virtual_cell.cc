@@ -68,7 +68,7 @@ Result<GeometryMap> VirtualCell::Map(const PartState& part, const ViewState& vie
   return BuildGeometryMap(scene, {config_.rig, side, rays, view.array_from_rig, shading, threads_});
 }
 
-std::vector<Pattern> VirtualCell::Patterns(PatternSet set) const {
+std::vector<Pattern> VirtualCell::Patterns(ProjectedSet set) const {
   return ProjectedPatterns(config_.projector_light, set);
 }
 

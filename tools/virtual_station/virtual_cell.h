@@ -49,7 +49,7 @@ class VirtualCell {
   // Errors: as View.
   Result<GeometryMap> Map(const PartState& part, const ViewState& view, Side side) const;
 
-  std::vector<Pattern> Patterns(PatternSet set) const;
+  std::vector<Pattern> Patterns(ProjectedSet set) const;
 
   // One 8-bit image; `pattern_index` counts in the order of projection and selects the noise.
   std::vector<std::uint8_t> Image(const GeometryMap& map, const ViewState& view, Side side,

@@ -1,8 +1,8 @@
 // Reliable, ordered streams of typed messages over a Bus that may lose, duplicate and reorder: sequence numbers, CRC-32,
 // resend on request, bounded give-up. One StreamHub a service; one sender a channel.
 //
-// Why: LCM loses large messages in silence when a kernel buffer is too small or a process is away too long. With the buffers
-// of tools/setup-host resends are rare; with Debian's defaults they carry everything.
+// Why: LCM loses large messages in silence when a kernel buffer is too small or a process is away too long. With
+// net.core.rmem_max at 128 MB (sysctl) resends are rare; with Debian's defaults they carry everything.
 #pragma once
 
 #include <map>

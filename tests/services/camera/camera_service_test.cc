@@ -42,6 +42,7 @@ class CameraServiceTest : public ::testing::Test {
     CameraSimOptions options;
     options.width_px = kWidthPx;
     options.height_px = kHeightPx;
+    options.exposure_us = CameraConfig{}.exposure_us;
     return options;
   }
   void Start() {
@@ -63,6 +64,7 @@ class CameraServiceTest : public ::testing::Test {
     exposure.view = view;
     exposure.pattern = pattern;
     exposure.pulse = pulse_;
+    exposure.exposure_us = ordered_exposure_us_;
     network_.RunFor(kPulsePeriodUs / 2);
     for (const auto camera : {kLeft, kRight}) {
       exposure.camera = camera;
@@ -117,6 +119,7 @@ class CameraServiceTest : public ::testing::Test {
   std::vector<fsmsg::view_frames_t> manifests_;
   int pulse_ = 0;
   bool send_records_ = true;
+  int ordered_exposure_us_ = CameraConfig{}.exposure_us;
 };
 
 TEST_F(CameraServiceTest, Starts) {
@@ -145,6 +148,35 @@ TEST_F(CameraServiceTest, SendsEveryFrameOfAViewWithItsPulse) {
   EXPECT_EQ(manifests_[0].part, 3);
   EXPECT_EQ(manifests_[0].view, 2);
   EXPECT_EQ(monitor_.counter("frames_sent"), kPatterns);
+}
+
+TEST_F(CameraServiceTest, AnExposureThatIsNotTheOrderedOneIsNoFrame) {
+  Start();
+  ordered_exposure_us_ += 1000;
+  View(1, 0);
+  EXPECT_TRUE(frames_.empty());
+  ASSERT_EQ(manifests_.size(), 1u);
+  EXPECT_EQ(manifests_[0].frames_missing, kPatterns);
+  EXPECT_THAT(manifests_[0].reason, AllOf(HasSubstr("13000 us"), HasSubstr("12000 us")));
+  ordered_exposure_us_ -= 1000;
+  View(1, 1);
+  EXPECT_EQ(frames_.size(), static_cast<std::size_t>(kPatterns));
+}
+
+// The trigger service was started again: its pulses are counted from 1.
+TEST_F(CameraServiceTest, PulsesCountedFromTheBeginningCostNoView) {
+  Start();
+  for (int view = 0; view < 3; ++view) {
+    View(1, view);
+  }
+  pulse_ = 0;
+  for (int view = 3; view < 6; ++view) {
+    View(1, view);
+  }
+  ASSERT_EQ(manifests_.size(), 6u);
+  for (const auto& manifest : manifests_) {
+    ExpectWhole(manifest);
+  }
 }
 
 TEST_F(CameraServiceTest, NamesThePulseWhoseTriggerWasLost) {

@@ -9,12 +9,12 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "services/reconstruction/reconstruct.h"
+#include "tests/common/real_data.h"
 
 namespace forgescan {
 namespace {
 
-const std::filesystem::path kDirectory =
-    std::filesystem::path(FORGESCAN_SOURCE_DIR) / "../shared/data/real-fringe-plane";
+const std::filesystem::path kDirectory = RealData("real-fringe-plane").value_or("");
 
 // Frames first, first + 3, ...: steps of 90 deg in a set of 12, for each of three periods.
 PatternSet EveryThird(int first, std::array<int, 3> frames, Background background) {
@@ -73,8 +73,8 @@ FittedPlane Fit(const PointCloud& cloud) {
 class RealBoard : public ::testing::Test {
  protected:
   void SetUp() override {
-    if (!std::filesystem::exists(kDirectory)) {
-      GTEST_SKIP() << "no ../shared/data/real-fringe-plane beside the repository";
+    if (kDirectory.empty()) {
+      GTEST_SKIP() << "real-fringe-plane" << kNoRealData;
     }
   }
 };

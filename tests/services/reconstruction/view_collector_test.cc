@@ -6,6 +6,7 @@
 namespace forgescan {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 using State = ViewCollector::State;
 constexpr std::int8_t kLeft = fsmsg::exposure_t::CAMERA_LEFT, kRight = fsmsg::exposure_t::CAMERA_RIGHT;
@@ -27,6 +28,7 @@ fsmsg::view_frames_t Manifest(std::int8_t camera, int sent, int missing = 0, int
   fsmsg::view_frames_t manifest{};
   manifest.camera = camera;
   manifest.attempt = attempt;
+  manifest.frames_expected = sent + missing;
   manifest.frames_sent = sent;
   manifest.frames_missing = missing;
   manifest.reason = missing > 0 ? "pulse 3 brought no image" : "";
@@ -90,7 +92,7 @@ TEST(ViewCollector, ContradictionsMakeItVoid) {
   }
   ViewCollector view(2);
   view.OnManifest(Manifest(kLeft, 3));
-  EXPECT_THAT(view.void_reason(), HasSubstr("3 frames"));
+  EXPECT_THAT(view.void_reason(), AllOf(HasSubstr("3 patterns"), HasSubstr("2 frames")));
 }
 
 TEST(ViewCollector, AnUnknownCameraIsLeftOut) {

@@ -1,5 +1,5 @@
 // A real laser scan of a shelf of objects, three quarters of it foreign to the model. The data are public
-// research data and not in the repository: FORGESCAN_DATA_DIR names the folder that holds real-clutter/.
+// research data and not in the repository: see tests/common/real_data.h.
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -10,6 +10,7 @@
 #include "services/common/geometry/cloud_io.h"
 #include "services/common/model/model_import.h"
 #include "services/registration/icp.h"
+#include "tests/common/real_data.h"
 
 namespace forgescan {
 namespace {
@@ -44,9 +45,9 @@ Eigen::Isometry3d Disturbance(const Eigen::Vector3d& center, std::mt19937_64& ra
 }
 
 TEST(RealClutter, TwentyOfTwentyStartsReachTheKnownPose) {
-  const char* data = std::getenv("FORGESCAN_DATA_DIR");
-  const std::filesystem::path folder = std::filesystem::path(data != nullptr ? data : ".") / "real-clutter";
-  if (!std::filesystem::exists(folder)) GTEST_SKIP() << "FORGESCAN_DATA_DIR/real-clutter is not here";
+  const auto found = RealData("real-clutter");
+  if (!found.has_value()) GTEST_SKIP() << "real-clutter" << kNoRealData;
+  const std::filesystem::path& folder = *found;
   const auto bundle = LoadModel(folder / "parasaurolophus_low_normals2.ply", {});
   ASSERT_TRUE(bundle.ok()) << bundle.error().message;
   const auto model = RegistrationModel::Build(*bundle);

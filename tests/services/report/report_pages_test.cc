@@ -44,7 +44,7 @@ TEST(ReportJson, HasExactlyItsFields) {
                   "rejected_share", "temperature_degc", "uncertainty_mm", "upper_mm", "verdict"}));
   EXPECT_EQ(Keys(report["registration"]),
             (List{"foreign_share", "inlier_share", "iterations", "model_from_array", "reason", "rms_mm",
-                  "shift_mm", "status", "turn_rad", "weakest_ratio"}));
+                  "shift_mm", "status", "turn_rad", "weakest_eigenvalue"}));
   EXPECT_EQ(Keys(report["views"][0]),
             (List{"captured_utime", "consistency_rms_rad", "modulation_median_dn", "points", "reason",
                   "scale", "status", "temperature_degc", "view"}));

@@ -72,7 +72,7 @@ TEST(Rendering, SameBytesOnAnyNumberOfThreads) {
     ASSERT_TRUE(view.ok());
     const auto map = cell.Map(*part, *view, Side::kLeft);
     ASSERT_TRUE(map.ok());
-    images.push_back(cell.Image(*map, *view, Side::kLeft, cell.Patterns(PatternSet::kReduced)[3], 3));
+    images.push_back(cell.Image(*map, *view, Side::kLeft, cell.Patterns(ProjectedSet::kReduced)[3], 3));
   }
   EXPECT_EQ(images[0], images[1]);
   EXPECT_EQ(images[0], images[2]);

@@ -70,7 +70,7 @@ TEST(Scene, WearMakesPlatesSmallerPartByPart) {
 TEST(Station, WritesFilesAndTruth) {
   const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "virtual_station_test";
   const CellConfig config = Config();
-  const Status written = WriteStation(config, PatternSet::kReduced, folder.string());
+  const Status written = WriteStation(config, ProjectedSet::kReduced, folder.string());
   ASSERT_TRUE(written.ok()) << written.error().message;
   for (const char* file : {"calibration/stereo.yaml", "pattern.toml", "views/views.toml", "model/axle.step",
                            "model/axle.stl", "model/features.toml"}) {

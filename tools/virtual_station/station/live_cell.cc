@@ -60,7 +60,7 @@ Result<std::unique_ptr<LiveCell>> LiveCell::Create(CellConfig config, const Live
 LiveCell::LiveCell(CellConfig config, LiveCellOptions options, std::unique_ptr<CanBus> can)
     : options_(std::move(options)),
       cell_(std::move(config), 2),
-      renderer_(cell_, PatternSet::kReduced),
+      renderer_(cell_, ProjectedSet::kReduced),
       can_(std::move(can)),
       robot_(RobotOf(cell_.config())),
       line_(LineOf(options_)),
@@ -77,7 +77,7 @@ LiveCell::~LiveCell() = default;
 Status LiveCell::CreateCameras(const CellConfig& config) {
   const auto link = std::make_shared<Link>(LinkOptions{.rate_mbit_s = options_.link_mbit_s});
   for (std::size_t side = 0; side < cameras_.size(); ++side) {
-    const Camera& camera = side == 0 ? config.rig.left : config.rig.right;
+    const PinholeCamera& camera = side == 0 ? config.rig.left : config.rig.right;
     GigeDeviceConfig device;
     device.address = options_.camera_address[side];
     device.mac += side;

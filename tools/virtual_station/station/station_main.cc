@@ -57,7 +57,7 @@ Status Prepare(const Arguments& arguments) {
   RETURN_IF_ERROR(WriteWholeFile((run / "station/station.toml").string(), station_text));
   RETURN_IF_ERROR(WriteWholeFile((run / "cell.toml").string(), cell_text));
   ASSIGN_OR_RETURN(const CellConfig config, LoadCellConfig((run / "cell.toml").string()));
-  return WriteStation(config, PatternSet::kReduced, (run / "station").string());
+  return WriteStation(config, ProjectedSet::kReduced, (run / "station").string());
 }
 
 Result<LiveCellOptions> Wires(const Arguments& arguments) {

@@ -12,7 +12,7 @@ constexpr int kNice = 10;              // behind everything that has a deadline
 
 }  // namespace
 
-ViewRenderer::ViewRenderer(const VirtualCell& cell, PatternSet set)
+ViewRenderer::ViewRenderer(const VirtualCell& cell, ProjectedSet set)
     : cell_(cell), patterns_(cell.Patterns(set)), worker_([this] { Work(); }) {}
 
 ViewRenderer::~ViewRenderer() {

@@ -26,7 +26,7 @@ struct RenderedView {
 // Thread-safe.
 class ViewRenderer {
  public:
-  ViewRenderer(const VirtualCell& cell, PatternSet set);
+  ViewRenderer(const VirtualCell& cell, ProjectedSet set);
   ~ViewRenderer();
   ViewRenderer(const ViewRenderer&) = delete;
   ViewRenderer& operator=(const ViewRenderer&) = delete;

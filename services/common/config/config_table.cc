@@ -1,50 +1,8 @@
-#include "services/common/config/config.h"
-
-#include <fmt/format.h>
-#include <libdeflate.h>
-
-#include <algorithm>
 #include <cmath>
-#include <fstream>
-#include <iterator>
-#include <set>
-#define TOML_EXCEPTIONS 0
-#define TOML_HEADER_ONLY 1
-#include <toml++/toml.h>
+
+#include "services/common/config/config_node.h"
 
 namespace forgescan {
-
-struct ConfigFile::Document {
-  toml::table table;
-};
-
-// A table being read. Children are kept so that Finish() sees the whole tree.
-struct ConfigTable::Node {
-  std::shared_ptr<const void> document;  // keeps `table` alive
-  const toml::table* table = nullptr;    // null = the file has no such table
-  std::string file;
-  std::string path;  // dotted name of the table, empty for the root
-  std::set<std::string, std::less<>> seen;
-  std::optional<Error> error;
-  std::vector<std::shared_ptr<Node>> children;
-
-  std::string Name(std::string_view key) const {
-    return path.empty() ? std::string(key) : fmt::format("{}.{}", path, key);
-  }
-  const toml::node* Find(std::string_view key) {
-    seen.emplace(key);
-    return table != nullptr ? table->get(key) : nullptr;
-  }
-  void Fault(ErrorCode code, std::string_view key, std::string_view what) {
-    if (!error.has_value()) {
-      error = Fail(code, "{}: {} {}", file, Name(key), what);
-    }
-  }
-  void Missing(std::string_view key, std::string_view what) {
-    Fault(ErrorCode::kNotFound, key, fmt::format("is missing: {} is required", what));
-  }
-};
-
 namespace {
 
 std::string Show(const toml::node& node) {
@@ -118,7 +76,8 @@ void ConfigTable::Optional(std::string_view key, bool& value) {
     return;
   }
   if (!found->is_boolean()) {
-    node_->Fault(ErrorCode::kInvalidArgument, key, fmt::format("is {}, but must be true or false", Show(*found)));
+    node_->Fault(ErrorCode::kInvalidArgument, key,
+                 fmt::format("is {}, but must be true or false", Show(*found)));
     return;
   }
   value = found->as_boolean()->get();
@@ -159,7 +118,8 @@ void ConfigTable::Optional(std::string_view key, std::vector<std::string>& value
 }
 
 void ConfigTable::Required(std::string_view key, double& value, double min, double max) {
-  Has(key) ? Optional(key, value, min, max) : node_->Missing(key, fmt::format("a number from {} to {}", min, max));
+  Has(key) ? Optional(key, value, min, max)
+           : node_->Missing(key, fmt::format("a number from {} to {}", min, max));
 }
 
 void ConfigTable::Required(std::string_view key, std::int64_t& value, std::int64_t min, std::int64_t max) {
@@ -206,7 +166,9 @@ void ConfigTable::Required(std::string_view key, std::vector<double>& value, std
   value = std::move(numbers);
 }
 
-bool ConfigTable::Has(std::string_view key) const { return node_->table != nullptr && node_->table->contains(key); }
+bool ConfigTable::Has(std::string_view key) const {
+  return node_->table != nullptr && node_->table->contains(key);
+}
 
 ConfigTable ConfigTable::Table(std::string_view key) {
   const toml::node* found = node_->Find(key);
@@ -262,49 +224,6 @@ Status ConfigTable::Finish() {
     if (!node_->seen.contains(key.str())) {
       return Fail(ErrorCode::kInvalidArgument, "{}: line {}: unknown key {}; known here: {}", node_->file,
                   value.source().begin.line, node_->Name(key.str()), fmt::join(node_->seen, ", "));
-    }
-  }
-  return {};
-}
-
-Result<ConfigFile> ConfigFile::Load(const std::string& path) {
-  std::ifstream stream(path, std::ios::binary);
-  const std::string text{std::istreambuf_iterator<char>(stream), {}};
-  if (!stream.is_open() || stream.bad()) {
-    return Fail(ErrorCode::kNotFound, "{}: cannot be read", path);
-  }
-  return Parse(text, path);
-}
-
-Result<ConfigFile> ConfigFile::Parse(std::string_view text, const std::string& name) {
-  toml::parse_result parsed = toml::parse(text, name);
-  if (!parsed) {
-    const auto& at = parsed.error().source().begin;
-    return Fail(ErrorCode::kFormat, "{}: line {}, column {}: {}", name, at.line, at.column,
-                parsed.error().description());
-  }
-  ConfigFile file;
-  file.path_ = name;
-  file.hash_ = fmt::format("{:08x}", libdeflate_crc32(0, text.data(), text.size()));
-  file.document_ = std::make_shared<Document>(Document{std::move(parsed).table()});
-  return file;
-}
-
-ConfigTable ConfigFile::Root() const {
-  auto node = std::make_shared<ConfigTable::Node>();
-  node->document = document_;
-  node->table = &document_->table;
-  node->file = path_;
-  return ConfigTable(std::move(node));
-}
-
-ConfigTable ConfigFile::Table(std::string_view key) const { return Root().Table(key); }
-
-Status ConfigFile::OnlyTables(const std::vector<std::string>& known) const {
-  for (const auto& [key, value] : document_->table) {
-    if (std::find(known.begin(), known.end(), key.str()) == known.end()) {
-      return Fail(ErrorCode::kInvalidArgument, "{}: line {}: unknown table {}; known here: {}", path_,
-                  value.source().begin.line, key.str(), fmt::join(known, ", "));
     }
   }
   return {};

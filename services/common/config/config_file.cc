@@ -1,0 +1,54 @@
+#include <libdeflate.h>
+
+#include <algorithm>
+#include <fstream>
+#include <iterator>
+
+#include "services/common/config/config_node.h"
+
+namespace forgescan {
+
+Result<ConfigFile> ConfigFile::Load(const std::string& path) {
+  std::ifstream stream(path, std::ios::binary);
+  const std::string text{std::istreambuf_iterator<char>(stream), {}};
+  if (!stream.is_open() || stream.bad()) {
+    return Fail(ErrorCode::kNotFound, "{}: cannot be read", path);
+  }
+  return Parse(text, path);
+}
+
+Result<ConfigFile> ConfigFile::Parse(std::string_view text, const std::string& name) {
+  toml::parse_result parsed = toml::parse(text, name);
+  if (!parsed) {
+    const auto& at = parsed.error().source().begin;
+    return Fail(ErrorCode::kFormat, "{}: line {}, column {}: {}", name, at.line, at.column,
+                parsed.error().description());
+  }
+  ConfigFile file;
+  file.path_ = name;
+  file.hash_ = fmt::format("{:08x}", libdeflate_crc32(0, text.data(), text.size()));
+  file.document_ = std::make_shared<Document>(Document{std::move(parsed).table()});
+  return file;
+}
+
+ConfigTable ConfigFile::Root() const {
+  auto node = std::make_shared<ConfigTable::Node>();
+  node->document = document_;
+  node->table = &document_->table;
+  node->file = path_;
+  return ConfigTable(std::move(node));
+}
+
+ConfigTable ConfigFile::Table(std::string_view key) const { return Root().Table(key); }
+
+Status ConfigFile::OnlyTables(const std::vector<std::string>& known) const {
+  for (const auto& [key, value] : document_->table) {
+    if (std::find(known.begin(), known.end(), key.str()) == known.end()) {
+      return Fail(ErrorCode::kInvalidArgument, "{}: line {}: unknown table {}; known here: {}", path_,
+                  value.source().begin.line, key.str(), fmt::join(known, ", "));
+    }
+  }
+  return {};
+}
+
+}  // namespace forgescan

@@ -1,0 +1,100 @@
+// A part whose fused cloud cannot become whole ends with a message that says so, in bounded time.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "services/common/bus/channels.h"
+#include "services/common/bus/sim_bus.h"
+#include "services/registration/registration_service.h"
+#include "tests/common/shapes/test_axle.h"
+
+namespace forgescan {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr std::int64_t kSecondUs = 1'000'000;
+
+class LostCloudTest : public ::testing::Test {
+ protected:
+  LostCloudTest() {
+    const auto bundle = testing::MakeAxle(testing::AxleSize{}, 16);
+    service_ = std::make_unique<RegistrationService>(hub_, monitor_, RegistrationConfig{},
+                                                     RegistrationModel::Build(*bundle).value());
+    listener_.Subscribe<fsmsg::registration_t>(kRegistration,
+                                               [this](const auto& message) { results_.push_back(message); });
+    network_.RunFor(kSecondUs);
+  }
+  void Fused(int part) {
+    fsmsg::fusion_result_t result{};
+    result.utime = network_.NowUs();
+    result.part = part;
+    result.status = fsmsg::view_result_t::STATUS_OK;
+    ASSERT_TRUE(fusion_.Publish(kFusionResult, result).ok());
+  }
+  // Two slices, of which the first `sent` are published.
+  void Slices(int part, std::size_t sent) {
+    constexpr std::size_t kPoints = 150'000;
+    PointCloud cloud;
+    cloud.points.assign(kPoints, Eigen::Vector3f(1, 2, 3));
+    cloud.normals.assign(kPoints, Eigen::Vector3f::UnitZ());
+    cloud.sigma_mm.assign(kPoints, 0.01F);
+    cloud.view.assign(kPoints, 0);
+    const auto slices = SliceCloud(cloud, 1, part, kAllViews).value();
+    ASSERT_EQ(slices.size(), 2U);
+    for (std::size_t i = 0; i < sent; ++i) {
+      ASSERT_TRUE(fusion_.Publish(kFusedCloud, slices[i]).ok());
+    }
+  }
+
+  SimNetwork network_;
+  StreamHub hub_{network_.AddNode(), "registration"};
+  StreamHub fusion_{network_.AddNode(), "fusion"};
+  StreamHub listener_{network_.AddNode(), "listener"};
+  ServiceMonitor monitor_{hub_, "registration", ""};
+  std::unique_ptr<RegistrationService> service_;
+  std::vector<fsmsg::registration_t> results_;
+};
+
+TEST_F(LostCloudTest, HalfACloudFailsAfterItsTimeout) {
+  Slices(1, 1);
+  Fused(1);
+  network_.RunFor(10 * kSecondUs);
+  EXPECT_TRUE(results_.empty());
+  network_.RunFor(10 * kSecondUs);  // the timeout is 15 s
+  ASSERT_EQ(results_.size(), 1U);
+  EXPECT_EQ(results_[0].status, fsmsg::registration_t::STATUS_FAILED);
+  EXPECT_THAT(results_[0].reason, HasSubstr("not whole"));
+  EXPECT_TRUE(std::isnan(results_[0].model_from_array[0]));
+}
+
+TEST_F(LostCloudTest, AWholeCloudIsNotGivenUp) {
+  Fused(1);
+  network_.RunFor(5 * kSecondUs);
+  Slices(1, 2);
+  network_.RunFor(30 * kSecondUs);
+  ASSERT_EQ(results_.size(), 1U);  // and fails for what it is: one point, 150 000 times
+  EXPECT_THAT(results_[0].reason, ::testing::Not(HasSubstr("not whole")));
+}
+
+TEST_F(LostCloudTest, ThePartNumberMayComeAgain) {
+  Fused(1);
+  network_.RunFor(20 * kSecondUs);
+  Fused(1);
+  network_.RunFor(10 * kSecondUs);
+  EXPECT_EQ(results_.size(), 1U);
+  network_.RunFor(10 * kSecondUs);
+  EXPECT_EQ(results_.size(), 2U);
+}
+
+TEST(RegistrationConfigRange, AStartBeyondWhatTheRegistrationAllowsIsRefusedByItsKey) {
+  const auto file = ConfigFile::Parse("[registration]\nstart_rotation_rad = 0.6\n", "station.toml");
+  ASSERT_TRUE(file.ok());
+  const auto config = RegistrationConfig::Load(file->Table("registration"));
+  ASSERT_FALSE(config.ok());
+  EXPECT_THAT(config.error().message, HasSubstr("start_rotation_rad is 0.6"));
+}
+
+}  // namespace
+}  // namespace forgescan
