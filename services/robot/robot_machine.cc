@@ -75,42 +75,6 @@ RobotMachine::Actions RobotMachine::Abort(const std::string& reason, std::int64_
   return actions;
 }
 
-// Why a part cannot be inspected now; empty when it can.
-std::string RobotMachine::WhyNot() const {
-  if (stop_) {
-    return stop_reason_;
-  }
-  if (!path_ || !status_ || path_->view_count == 0) {
-    return "the robot controller has no taught path";
-  }
-  if (config_.path_crc32 != 0 && path_->crc32 != config_.path_crc32) {
-    return fmt::format("the taught path has CRC {:#010x}, the view matrices belong to {:#010x}", path_->crc32,
-                       config_.path_crc32);
-  }
-  if (!status_->automatic || !status_->drives_on) {
-    return "the robot is not in automatic mode with its drives on";
-  }
-  if (config_.require_warm && !status_->warm) {
-    return fmt::format("the robot is not warm yet ({:.1f} degC)", body_degc_);
-  }
-  return "";
-}
-
-RobotMachine::Actions RobotMachine::Start(std::int64_t now_us) {
-  part_ = last_part_ = static_cast<std::int32_t>(line_part_.part);
-  start_us_ = line_part_.utime;
-  view_ = attempt_ = captured_ = 0;
-  void_reason_.clear();
-  Actions actions{PartStarted{start_us_, part_, path_ ? path_->view_count : 0, path_ ? path_->crc32 : 0}};
-  if (const std::string why_not = WhyNot(); !why_not.empty()) {
-    actions.emplace_back(ScanFinished{now_us, start_us_, part_, path_ ? path_->view_count : 0, 0, why_not});
-    return actions;
-  }
-  phase_ = RobotPhase::kSelecting;
-  Append(actions, Order(RobotOrder::kSelectPath, now_us));
-  return actions;
-}
-
 RobotMachine::Actions RobotMachine::Approach(std::int64_t now_us) {
   phase_ = RobotPhase::kApproaching;
   in_position_since_us_.reset();
@@ -147,26 +111,6 @@ RobotMachine::Actions RobotMachine::OnFault(const DeviceFault& fault, std::int64
   const std::string text =
       fmt::format("the robot controller reports fault {:#06x} ({:#x})", fault.code, fault.detail);
   return scanning() ? Abort(text, now_us) : Actions{RobotNote{text}};
-}
-
-RobotMachine::Actions RobotMachine::OnLineLink(bool up, std::int64_t now_us) {
-  if (up) {
-    return {};
-  }
-  line_part_ = {};
-  return scanning() ? Abort("the line's signals stopped", now_us) : Actions{};
-}
-
-RobotMachine::Actions RobotMachine::OnPart(const LinePart& part, std::int64_t now_us) {
-  const bool changed = part.part != line_part_.part || part.in_place != line_part_.in_place;
-  line_part_ = changed ? part : line_part_;  // the time of arrival stays that of the first report
-  if (scanning()) {
-    const bool ours = part.in_place && static_cast<std::int32_t>(part.part) == part_;
-    return ours ? Actions{} : Abort(fmt::format("part {} left its place during the scan", part_), now_us);
-  }
-  const bool new_part = line_part_.in_place && static_cast<std::int32_t>(line_part_.part) != last_part_;
-  const bool possible = phase_ == RobotPhase::kReady && status_.has_value();
-  return new_part && possible ? Start(now_us) : Actions{};
 }
 
 RobotMachine::Actions RobotMachine::OnPyrometer(const LinePyrometer& reading) {

@@ -23,9 +23,11 @@ int OpenSignals() {
 
 void WarnOfSmallBuffer(const BusHealth& health) {
   if (health.receive_buffer_bytes < kWantedReceiveBufferBytes) {
-    spdlog::warn("the bus socket's receive buffer is {} bytes, {} are wanted: frames will often be lost and sent again; "
-                 "sysctl net.core.rmem_max={} allows it",
-                 health.receive_buffer_bytes, kWantedReceiveBufferBytes, kWantedReceiveBufferBytes / 2);
+    spdlog::warn(
+        "the bus socket's receive buffer is {} bytes, {} are wanted: frames will often be lost and sent "
+        "again; "
+        "sysctl net.core.rmem_max={} allows it",
+        health.receive_buffer_bytes, kWantedReceiveBufferBytes, kWantedReceiveBufferBytes / 2);
   }
 }
 

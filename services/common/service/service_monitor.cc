@@ -1,5 +1,7 @@
 #include "services/common/service/service_monitor.h"
 
+#include <spdlog/spdlog.h>
+
 #include "services/common/bus/channels.h"
 
 namespace forgescan {
@@ -31,6 +33,9 @@ void ServiceMonitor::SetState(ServiceState state, const std::string& text) {
 }
 
 void ServiceMonitor::ReportError(const Error& error) {
+  if (error.message != last_error_) {  // the same again and again is counted, not written
+    spdlog::warn("{}", error.message);
+  }
   last_error_ = error.message;
   Count("errors");
   Publish();

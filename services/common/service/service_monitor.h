@@ -33,7 +33,7 @@ class ServiceMonitor {
   std::int64_t counter(const std::string& name) const;
 
   void SetState(ServiceState state, const std::string& text);
-  // Keeps the sentence as last error and counts it under `errors`; the state stays as it is.
+  // Keeps the sentence as last error, writes it to the log and counts it under `errors`; the state stays as it is.
   void ReportError(const Error& error);
   void SetCounter(const std::string& name, std::int64_t value) { counters_[name] = value; }
   void Count(const std::string& name, std::int64_t by = 1) { counters_[name] += by; }

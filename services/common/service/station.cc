@@ -23,8 +23,8 @@ Result<Station> Station::Load(const std::string& folder) {
     *path = (base / *path).lexically_normal().string();
   }
   RETURN_IF_ERROR(table.Finish());
-  RETURN_IF_ERROR(file.OnlyTables({"station", "trigger", "camera", "robot", "cooling", "reconstruction", "fusion",
-                                   "registration", "report"}));
+  RETURN_IF_ERROR(file.OnlyTables({"station", "trigger", "camera", "robot", "cooling", "reconstruction",
+                                   "fusion", "registration", "report"}));
   return station;
 }
 

@@ -114,7 +114,25 @@ Status PublishTruth(const fs::path& run, const Station& station, const fsmsg::ve
     return Fail(ErrorCode::kIo, "{} cannot be copied to {}: {}", truth.string(), folder.string(),
                 problem.message());
   }
+  if (!fs::exists(folder / "report.html") || !fs::exists(folder / "report.json")) {
+    return Fail(ErrorCode::kNotFound, "part {} has no report in {}; {} has the logs", verdict.part,
+                folder.string(), run.string());
+  }
   fmt::print("report {}\n", folder.string());
+  return {};
+}
+
+// A part that could not be inspected is no result, however well that is reported.
+Status JudgeRun(const std::vector<fsmsg::verdict_t>& verdicts, int parts) {
+  if (static_cast<int>(verdicts.size()) != parts) {
+    return Fail(ErrorCode::kUntrusted, "{} verdicts came for {} parts", verdicts.size(), parts);
+  }
+  for (const fsmsg::verdict_t& verdict : verdicts) {
+    if (verdict.verdict == fsmsg::verdict_t::VERDICT_NOT_INSPECTED ||
+        verdict.verdict == fsmsg::verdict_t::VERDICT_UNKNOWN) {
+      return Fail(ErrorCode::kUntrusted, "part {} was not inspected: {}", verdict.part, verdict.reason);
+    }
+  }
   return {};
 }
 
@@ -193,7 +211,7 @@ Status Inspect(const InspectOptions& options) {
   for (const fsmsg::verdict_t& verdict : *verdicts) {
     RETURN_IF_ERROR(PublishTruth(run, runner->station(), verdict));
   }
-  return {};
+  return JudgeRun(*verdicts, options.parts);
 }
 
 }  // namespace

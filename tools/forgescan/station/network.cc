@@ -127,11 +127,11 @@ Status MapUser(uid_t uid, gid_t gid) {
 }  // namespace
 
 bool HasMulticastRoute() {
-  const Netlink netlink;
-  if (!netlink.AskRouteTo(Address(kGroups[0]).sin_addr)) {
-    return false;
-  }
-  return netlink.AnsweredDevice() == static_cast<int>(if_nametoindex("lo"));
+  return std::all_of(std::begin(kGroups), std::end(kGroups), [](const char* group) {
+    const Netlink netlink;
+    return netlink.AskRouteTo(Address(group).sin_addr) &&
+           netlink.AnsweredDevice() == static_cast<int>(if_nametoindex("lo"));
+  });
 }
 
 Status EnterPrivateNetwork() {

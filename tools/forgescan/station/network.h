@@ -6,7 +6,7 @@
 
 namespace forgescan {
 
-// True if datagrams to LCM's group leave by loopback.
+// True if datagrams to the groups of LCM and of CAN over UDP leave by loopback.
 bool HasMulticastRoute();
 
 // Moves this process (before it has threads) into a new network namespace with loopback and the routes the

@@ -7,6 +7,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <csignal>
 #include <cstring>
 #include <filesystem>
@@ -31,13 +32,8 @@ std::string LastLine(const std::string& path) {
   return last;
 }
 
-// In the child: never returns. The tool has one thread, so any call is safe between fork and exec.
-[[noreturn]] void Become(const std::vector<std::string>& command, int log) {
-  std::vector<char*> arguments;
-  for (const std::string& word : command) {
-    arguments.push_back(const_cast<char*>(word.c_str()));
-  }
-  arguments.push_back(nullptr);
+// In the child: never returns. Only calls that are safe between fork and exec in a program with threads.
+[[noreturn]] void Become(char* const* arguments, int log) {
   prctl(PR_SET_PDEATHSIG, SIGTERM);  // a tool that is killed leaves no services behind
   setpgid(0, 0);                     // Ctrl-C reaches the tool, and the tool stops the services in order
   sigset_t none;
@@ -46,7 +42,7 @@ std::string LastLine(const std::string& path) {
   dup2(open("/dev/null", O_RDONLY), STDIN_FILENO);
   dup2(log, STDOUT_FILENO);
   dup2(log, STDERR_FILENO);
-  execv(arguments[0], arguments.data());
+  execv(arguments[0], arguments);
   _exit(127);
 }
 
@@ -61,9 +57,14 @@ Status ProcessGroup::Start(const std::string& name, const std::vector<std::strin
     return Fail(ErrorCode::kIo, "{} cannot be started with its log in {}: {}", command[0], LogOf(name),
                 std::strerror(errno));
   }
+  std::vector<char*> arguments;
+  for (const std::string& word : command) {
+    arguments.push_back(const_cast<char*>(word.c_str()));
+  }
+  arguments.push_back(nullptr);
   const pid_t pid = fork();
   if (pid == 0) {
-    Become(command, log);
+    Become(arguments.data(), log);
   }
   close(log);
   if (pid < 0) {
@@ -90,9 +91,12 @@ Status ProcessGroup::WaitForSuccess() {
   while (!processes_.empty()) {
     const Process process = processes_.back();
     int status = 0;
-    waitpid(process.pid, &status, 0);
+    pid_t ended = -1;
+    do {
+      ended = waitpid(process.pid, &status, 0);
+    } while (ended < 0 && errno == EINTR);
     processes_.pop_back();
-    if (status != 0) {
+    if (ended != process.pid || status != 0) {
       return Fail(ErrorCode::kUnavailable, "{} {}: {}", process.name, Fate(status),
                   LastLine(LogOf(process.name)));
     }

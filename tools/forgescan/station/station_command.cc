@@ -1,5 +1,6 @@
 // forgescan station up|down|status FOLDER
 #include <fcntl.h>
+#include <sys/file.h>
 #include <sys/ioctl.h>
 #include <unistd.h>
 
@@ -25,15 +26,44 @@ std::string PidFile(const std::string& folder) {
   return (std::filesystem::path(folder) / "station.pid").string();
 }
 
-// The process that runs the station. Errors: kNotFound (none does).
+// The process that runs the station: it holds a lock on its file, so a file left behind by a crash names
+// nobody. Errors: kNotFound (none does).
 Result<int> RunningPid(const std::string& folder) {
   int pid = 0;
   std::ifstream(PidFile(folder)) >> pid;
-  if (pid <= 0 || kill(pid, 0) != 0) {
+  const int fd = open(PidFile(folder).c_str(), O_RDONLY | O_CLOEXEC);
+  const bool locked = fd >= 0 && flock(fd, LOCK_EX | LOCK_NB) != 0;
+  close(fd);
+  if (!locked || pid <= 0) {
     return Fail(ErrorCode::kNotFound, "station {} is not up", folder);
   }
   return pid;
 }
+
+// Held by `station up` while it runs.
+class PidLock {
+ public:
+  explicit PidLock(const std::string& folder)
+      : path_(PidFile(folder)), fd_(open(path_.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0644)) {
+    const std::string pid = std::to_string(getpid()) + "\n";
+    held_ = fd_ >= 0 && flock(fd_, LOCK_EX | LOCK_NB) == 0 &&
+            write(fd_, pid.data(), pid.size()) == static_cast<ssize_t>(pid.size());
+  }
+  ~PidLock() {
+    if (held_) {
+      std::filesystem::remove(path_);
+    }
+    close(fd_);
+  }
+  PidLock(const PidLock&) = delete;
+  PidLock& operator=(const PidLock&) = delete;
+  bool held() const { return held_; }
+
+ private:
+  std::string path_;
+  int fd_;
+  bool held_ = false;
+};
 
 int TerminalWidth() {
   winsize size{};
@@ -62,8 +92,11 @@ Status Up(const std::string& folder) {
   if (!HasMulticastRoute()) {
     RETURN_IF_ERROR(EnterPrivateNetwork());
   }
+  const PidLock lock(folder);
+  if (!lock.held()) {
+    return Fail(ErrorCode::kIo, "{} cannot be written", PidFile(folder));
+  }
   ASSIGN_OR_RETURN(const auto runner, StationRunner::Start(folder));
-  std::ofstream(PidFile(folder)) << getpid() << "\n";
   Status status = runner->WaitUntilReady(kReadyPatienceUs);
   if (status.ok()) {
     std::printf("station %s is up\n", runner->station().name.c_str());
@@ -71,7 +104,6 @@ Status Up(const std::string& folder) {
     status = Watch(*runner, interrupt);
   }
   runner->Stop();
-  std::filesystem::remove(PidFile(folder));
   return status;
 }
 
@@ -80,7 +112,7 @@ Status Down(const std::string& folder) {
   kill(pid, SIGTERM);
   constexpr int kPatienceSteps = 600;
   for (int step = 0; step < kPatienceSteps; ++step) {
-    if (kill(pid, 0) != 0) {
+    if (!RunningPid(folder).ok()) {
       std::printf("station %s is down\n", folder.c_str());
       return {};
     }
