@@ -57,6 +57,10 @@ function(forgescan_test name)
     set(ARG_TIMEOUT 120)
   endif()
   set_tests_properties(${name} PROPERTIES TIMEOUT ${ARG_TIMEOUT})
+  if(FORGESCAN_SANITIZE)
+    set_tests_properties(${name} PROPERTIES ENVIRONMENT
+                         "LSAN_OPTIONS=suppressions=${CMAKE_SOURCE_DIR}/tests/lsan.supp:print_suppressions=0")
+  endif()
 endfunction()
 
 # uses_regex(TARGET): GCC 12 warns of std::regex's own members when sanitizers are on (a false alarm); only there, and only
