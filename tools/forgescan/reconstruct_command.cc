@@ -90,6 +90,7 @@ nlohmann::json ToJson(const CameraQuality& quality) {
   };
   return {{"pixels", pixels},
           {"repaired", quality.repaired},
+          {"clipping_dn", number(quality.clipping_dn)},
           {"median_modulation_dn", quality.median_modulation_dn},
           {"median_sigma_px", quality.median_sigma_px},
           {"measured_noise_dn", number(quality.trust.noise_dn)},
@@ -117,6 +118,11 @@ nlohmann::json ToJson(const Reconstruction& reconstruction) {
                          {"right", ToJson(quality.right)}};
   if (quality.median_projector_residual_px) {
     json["median_projector_residual_px"] = *quality.median_projector_residual_px;
+  }
+  if (const auto& figures = quality.projector_consistency) {
+    json["projector_consistency"] = {{"column_rms_px", figures->column_rms_px},
+                                     {"flat_column_rms_px", figures->flat_column_rms_px},
+                                     {"flat_parallax_px", figures->flat_parallax_px}};
   }
   return json;
 }
