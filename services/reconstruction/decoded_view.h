@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <opencv2/core/mat.hpp>
+#include <optional>
 #include <string_view>
 
 namespace forgescan {
@@ -11,7 +12,7 @@ namespace forgescan {
 // Why a pixel was left out; the first cause that applies, in this order.
 enum class MaskCause : std::uint8_t {
   kValid,
-  kSaturated,
+  kSaturated,  // or where the camera cuts off its grey values
   kLowModulation,
   kNoisy,            // predicted phase sigma too large
   kModulationRatio,  // the frequencies' modulations do not fit together: a disturbed frame or background
@@ -39,8 +40,9 @@ struct DecodedView {
   cv::Mat_<std::uint8_t> cause;           // MaskCause
   std::array<long, kMaskCauses> count{};  // pixels by cause; their sum is the image
   long repaired = 0;  // valid pixels whose fringe order was doubtful and came from their neighbours
-  double median_modulation_dn = 0;  // over valid pixels
-  double median_sigma_px = 0;       // over valid pixels
+  std::optional<double> clipping_dn;  // where the camera cut off grey values, if below saturation_fraction
+  double median_modulation_dn = 0;    // over valid pixels
+  double median_sigma_px = 0;         // over valid pixels
 };
 
 }  // namespace forgescan

@@ -7,12 +7,16 @@
 #include <vector>
 
 #include "services/common/parallel_rows.h"
+#include "services/reconstruction/clipping.h"
 #include "services/reconstruction/fringe_order_repair.h"
 #include "services/reconstruction/histogram_median.h"
 #include "services/reconstruction/strip_decoder.h"
 
 namespace forgescan {
 namespace {
+
+constexpr double kFullScaleDn = 255;
+constexpr double kRounding = 1e-5;  // of a grey value scaled in single precision
 
 DecodedView MakeView(cv::Size size) {
   DecodedView view;
@@ -90,7 +94,6 @@ Status CheckFrames(std::span<const cv::Mat> frames, int count) {
 }
 
 double GreyScale(const cv::Mat& frame, const ReconstructionConfig& config) {
-  constexpr double kFullScaleDn = 255;
   return frame.depth() == CV_8U ? 1 : kFullScaleDn / config.full_scale_16bit_dn;
 }
 
@@ -109,8 +112,16 @@ Result<DecodedView> FringeDecoder::Decode(std::span<const cv::Mat> frames) const
   RETURN_IF_ERROR(CheckFrames(frames, pattern_.frame_count()));
   const cv::Size size = frames[0].size();
   DecodedView view = MakeView(size);
+  ReconstructionConfig config = config_;
+  if (const auto level = FindClippingLevel(frames, pattern_, config_.threads)) {
+    const double clipping_dn = GreyScale(frames[0], config_) * *level;
+    if (clipping_dn < config_.saturation_fraction * kFullScaleDn) {
+      view.clipping_dn = clipping_dn;
+      config.saturation_fraction = (1 - kRounding) * clipping_dn / kFullScaleDn;
+    }
+  }
   ParallelRows(config_.threads, size.height, [&](int begin, int end) {
-    const auto strip = std::make_unique<StripDecoder>(pattern_, config_, estimator_, table_);
+    const auto strip = std::make_unique<StripDecoder>(pattern_, config, estimator_, table_);
     for (int row = begin; row < end; ++row) {
       for (int column = 0; column < size.width; column += StripDecoder::kLength) {
         const int length = std::min(StripDecoder::kLength, size.width - column);

@@ -34,6 +34,27 @@ double MedianSigmaMm(const PointCloud& cloud) {
   return median.total() > 0 ? median.Median() : 0;
 }
 
+Status JudgeConsistency(const ProjectorConsistency& figures, double sigma_px,
+                        const ReconstructionConfig& config) {
+  const double limit_px = std::hypot(config.max_column_rms_px, config.max_column_rms_sigma * sigma_px);
+  if (!(figures.column_rms_px <= limit_px)) {
+    return Fail(ErrorCode::kUntrusted,
+                "no projector could have lit the points by the columns they show: {:.3f} px rms, limit "
+                "{:.3f}: the cameras are exchanged or mirrored, or the calibration is of another rig",
+                figures.column_rms_px, limit_px);
+  }
+  const double limit_parallax_px = config.max_parallax_ratio * figures.flat_column_rms_px;
+  if (!(figures.flat_parallax_px <= limit_parallax_px)) {
+    return Fail(
+        ErrorCode::kUntrusted,
+        "the fringes are those of a flat scene within {:.3f} px, the points are off a plane by {:.3f} "
+        "px, limit {:.3f}: the cameras are exchanged or mirrored, or the calibration is of another "
+        "rig",
+        figures.flat_column_rms_px, figures.flat_parallax_px, limit_parallax_px);
+  }
+  return {};
+}
+
 }  // namespace
 
 Reconstructor::Reconstructor(FringeDecoder decoder, StereoRig rig, const ReconstructionConfig& config)
@@ -63,6 +84,7 @@ Result<Reconstructor::Camera> Reconstructor::DecodeCamera(std::span<const cv::Ma
   RETURN_IF_ERROR(JudgeTrust(*trust, decoder_, config_, name));
   const CameraQuality quality = {.pixels = view->count,
                                  .repaired = view->repaired,
+                                 .clipping_dn = view->clipping_dn,
                                  .median_modulation_dn = view->median_modulation_dn,
                                  .median_sigma_px = view->median_sigma_px,
                                  .trust = *trust};
@@ -92,6 +114,7 @@ Result<Reconstruction> Reconstructor::Run(std::span<const cv::Mat> left,
                     .steep = points.steep,
                     .projector = points.projector,
                     .median_projector_residual_px = points.median_projector_residual_px,
+                    .projector_consistency = MeasureProjectorConsistency(points.sample, rig_.baseline_mm),
                     .median_sigma_mm = MedianSigmaMm(points.cloud_in_camera)};
   result.cloud_in_camera = std::move(points.cloud_in_camera);
   RETURN_IF_ERROR(Judge(result));
@@ -119,7 +142,9 @@ Status Reconstructor::Judge(const Reconstruction& reconstruction) const {
     return Fail(ErrorCode::kUntrusted, "the view has {} points, at least {} are needed", points,
                 config_.min_points);
   }
-  return {};
+  return quality.projector_consistency
+             ? JudgeConsistency(*quality.projector_consistency, quality.left.median_sigma_px, config_)
+             : Status();
 }
 
 Result<Reconstruction> Reconstruct(std::span<const cv::Mat> left, std::span<const cv::Mat> right,

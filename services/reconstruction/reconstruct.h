@@ -12,6 +12,7 @@
 #include "services/reconstruction/decoded_view.h"
 #include "services/reconstruction/fringe_decoder.h"
 #include "services/reconstruction/pattern_set.h"
+#include "services/reconstruction/projector_consistency.h"
 #include "services/reconstruction/reconstruction_config.h"
 #include "services/reconstruction/stereo_rig.h"
 #include "services/reconstruction/trust.h"
@@ -21,6 +22,7 @@ namespace forgescan {
 struct CameraQuality {
   std::array<long, kMaskCauses> pixels{};  // by MaskCause
   long repaired = 0;
+  std::optional<double> clipping_dn;  // see DecodedView
   double median_modulation_dn = 0;
   double median_sigma_px = 0;
   TrustFigures trust;
@@ -39,6 +41,7 @@ struct ReconstructionQuality {
   long steep = 0;
   long projector = 0;
   std::optional<double> median_projector_residual_px;
+  std::optional<ProjectorConsistency> projector_consistency;  // nothing with too few points
   double median_sigma_mm = 0;
 };
 

@@ -53,9 +53,12 @@ struct ReconstructionConfig {
       0.02;  // the projector's 2nd harmonic exceeds this and the background is shared,
   double max_saturated_fraction = 0.2;  // more than this part of the lit pixels is saturated,
   double max_median_projector_residual_px =
-      0.2;                            // the projector disagrees by more than this: the calibration drifted,
-  double min_matched_fraction = 0.1;  // less than this part of the decoded pixels finds its partner
-  int min_points = 1000;              // or fewer points remain.
+      0.2;                             // the projector disagrees by more than this: the calibration drifted,
+  double max_column_rms_px = 0.12;     // no projector explains the columns of the points better than this,
+  double max_column_rms_sigma = 1.0;   // both added as squares; sigma: of the left view's median coordinate,
+  double max_parallax_ratio = 10;      // the cameras see so many times the relief the projector sees,
+  double min_matched_fraction = 0.25;  // less than this part of the decoded pixels finds its partner
+  int min_points = 1000;               // or fewer points remain.
 
   int threads = 2;
 };

@@ -132,12 +132,29 @@ class RowTriangulator {
   DisparityGradient gradient_;
 };
 
+std::vector<LitPoint> Sample(const std::vector<RowResult>& rows, std::size_t total) {
+  constexpr std::size_t kWanted = 4000;
+  const std::size_t step = total / kWanted + 1;
+  std::vector<LitPoint> sample;
+  std::size_t next = step / 2;
+  std::size_t first = 0;  // of the row, among all candidates
+  for (const RowResult& row : rows) {
+    for (; next < first + row.candidates.size(); next += step) {
+      const Candidate& candidate = row.candidates[next - first];
+      sample.push_back({candidate.p_in_camera, candidate.coordinate_px});
+    }
+    first += row.candidates.size();
+  }
+  return sample;
+}
+
 Triangulation Join(const std::vector<RowResult>& rows) {
   Triangulation joined;
   std::size_t total = 0;
   for (const RowResult& row : rows) {
     total += row.candidates.size();
   }
+  joined.sample = Sample(rows, total);
   joined.cloud_in_camera.points.reserve(total);
   joined.cloud_in_camera.normals.reserve(total);
   joined.cloud_in_camera.sigma_mm.reserve(total);

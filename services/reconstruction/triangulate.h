@@ -2,20 +2,23 @@
 #pragma once
 
 #include <optional>
+#include <vector>
 
 #include "services/common/geometry/point_cloud.h"
 #include "services/reconstruction/disparity.h"
+#include "services/reconstruction/projector_consistency.h"
 #include "services/reconstruction/stereo_rig.h"
 
 namespace forgescan {
 
 struct Triangulation {
   PointCloud
-      cloud_in_camera;   // scanner order: rows of the rectified left image from the top, each from the left
-  long depth_range = 0;  // dropped: outside min_depth_mm..max_depth_mm
-  long no_normal = 0;    // dropped: too few neighbours for a normal
-  long steep = 0;        // dropped: seen under a too flat angle
-  long projector = 0;    // dropped: the projector would have lit them by another column
+      cloud_in_camera;  // scanner order: rows of the rectified left image from the top, each from the left
+  std::vector<LitPoint> sample;  // about 4000 of the points, evenly along the scanner order
+  long depth_range = 0;          // dropped: outside min_depth_mm..max_depth_mm
+  long no_normal = 0;            // dropped: too few neighbours for a normal
+  long steep = 0;                // dropped: seen under a too flat angle
+  long projector = 0;            // dropped: the projector would have lit them by another column
   std::optional<double> median_projector_residual_px;  // only with a calibrated projector
 };
 

@@ -14,6 +14,7 @@
 #include "services/common/geometry/cloud_io.h"
 #include "services/reconstruction/reconstruct.h"
 #include "tools/forgescan/command.h"
+#include "tools/forgescan/output_files.h"
 
 namespace forgescan {
 namespace {
@@ -89,6 +90,7 @@ nlohmann::json ToJson(const CameraQuality& quality) {
   };
   return {{"pixels", pixels},
           {"repaired", quality.repaired},
+          {"clipping_dn", number(quality.clipping_dn)},
           {"median_modulation_dn", quality.median_modulation_dn},
           {"median_sigma_px", quality.median_sigma_px},
           {"measured_noise_dn", number(quality.trust.noise_dn)},
@@ -117,6 +119,11 @@ nlohmann::json ToJson(const Reconstruction& reconstruction) {
   if (quality.median_projector_residual_px) {
     json["median_projector_residual_px"] = *quality.median_projector_residual_px;
   }
+  if (const auto& figures = quality.projector_consistency) {
+    json["projector_consistency"] = {{"column_rms_px", figures->column_rms_px},
+                                     {"flat_column_rms_px", figures->flat_column_rms_px},
+                                     {"flat_parallax_px", figures->flat_parallax_px}};
+  }
   return json;
 }
 
@@ -131,15 +138,19 @@ Status WriteJson(const std::filesystem::path& path, const nlohmann::json& json) 
 }
 
 Status RunReconstruct(const ReconstructArguments& arguments) {
+  ASSIGN_OR_RETURN(auto outputs, OutputFiles::Create({arguments.left, arguments.right, arguments.calibration,
+                                                      arguments.pattern},
+                                                     {arguments.out, arguments.json}));
   ASSIGN_OR_RETURN(const auto pattern, LoadPatternSet(arguments.pattern));
   ASSIGN_OR_RETURN(const auto calibration, LoadStereoCalibration(arguments.calibration));
   ASSIGN_OR_RETURN(const auto left, ReadFrames(arguments.left, pattern));
   ASSIGN_OR_RETURN(const auto right, ReadFrames(arguments.right, pattern));
   ASSIGN_OR_RETURN(const auto result, Reconstruct(left, right, pattern, calibration, arguments.config));
   if (!arguments.json.empty()) {
-    RETURN_IF_ERROR(WriteJson(arguments.json, ToJson(result)));
+    RETURN_IF_ERROR(WriteJson(outputs.Staged(arguments.json), ToJson(result)));
   }
-  return WritePly(arguments.out, result.cloud_in_camera);
+  RETURN_IF_ERROR(WritePly(outputs.Staged(arguments.out), result.cloud_in_camera));
+  return outputs.Commit();
 }
 
 }  // namespace

@@ -93,6 +93,24 @@ Result<StereoCalibration> ReadCalibration(const cv::FileStorage& file, const std
   return calibration;
 }
 
+// Everything but the focal lengths and the principal point is given: OpenCV's model knows no skew.
+Status CheckForm(const Eigen::Matrix3d& camera_matrix, const char* which) {
+  Eigen::Matrix3d form = Eigen::Matrix3d::Identity();
+  for (const auto& [row, column] : {std::pair(0, 0), std::pair(1, 1), std::pair(0, 2), std::pair(1, 2)}) {
+    form(row, column) = camera_matrix(row, column);
+  }
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) {
+      if (camera_matrix(row, column) != form(row, column)) {
+        return Fail(ErrorCode::kInvalidArgument,
+                    "the camera matrix of the {} holds {} in row {}, column {}, where only {} is allowed",
+                    which, camera_matrix(row, column), row + 1, column + 1, form(row, column));
+      }
+    }
+  }
+  return {};
+}
+
 Status CheckIntrinsics(const CameraIntrinsics& camera, const char* which) {
   const bool finite =
       camera.camera_matrix.allFinite() && std::all_of(camera.distortion.begin(), camera.distortion.end(),
@@ -106,7 +124,7 @@ Status CheckIntrinsics(const CameraIntrinsics& camera, const char* which) {
                 "the focal lengths of the {} are {} and {} px, they must be positive", which,
                 camera.camera_matrix(0, 0), camera.camera_matrix(1, 1));
   }
-  return {};
+  return CheckForm(camera.camera_matrix, which);
 }
 
 Status CheckPose(const PoseFromLeft& pose, const char* which) {

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <filesystem>
 #include <numbers>
+#include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 
 #include "services/reconstruction/reconstruct.h"
@@ -102,6 +103,42 @@ TEST_F(RealBoard, TwoIndependentSetsGiveTheSamePlane) {
       a->cloud_in_camera.size(), b->cloud_in_camera.size(), plane_a.sigma_mm, plane_b.sigma_mm, angle_deg,
       offset_mm, known, plane_a.normal.x(), plane_a.normal.y(), plane_a.normal.z());
   EXPECT_NEAR(a->quality.left.trust.second_harmonic_ratio.value(), 0.15, 0.02);  // 0.13-0.17, by others
+}
+
+TEST_F(RealBoard, RefusesExchangedAndMirroredImages) {
+  const PatternSet pattern = EveryThird(1, {4, 4, 4}, Background::kOwn);
+  const auto calibration = LoadStereoCalibration(kDirectory / "stereo_params.yaml");
+  ASSERT_TRUE(calibration.ok()) << calibration.error().message;
+  auto left = ReadFrames("L", pattern);
+  auto right = ReadFrames("R", pattern);
+  const auto exchanged = Reconstruct(right, left, pattern, *calibration, {});
+  ASSERT_FALSE(exchanged.ok());
+  EXPECT_THAT(exchanged.error().message, ::testing::HasSubstr("exchanged or mirrored"));
+  for (auto* camera : {&left, &right}) {
+    for (cv::Mat& frame : *camera) {
+      cv::flip(frame, frame, 1);
+    }
+  }
+  const auto mirrored = Reconstruct(left, right, pattern, *calibration, {});
+  ASSERT_FALSE(mirrored.ok());
+  EXPECT_THAT(mirrored.error().message, ::testing::HasSubstr("exchanged or mirrored"));
+}
+
+TEST_F(RealBoard, RefusesGreyValuesCutOffBelowFullScale) {
+  const PatternSet pattern = EveryThird(1, {4, 4, 4}, Background::kOwn);
+  const auto calibration = LoadStereoCalibration(kDirectory / "stereo_params.yaml");
+  ASSERT_TRUE(calibration.ok()) << calibration.error().message;
+  auto left = ReadFrames("L", pattern);
+  auto right = ReadFrames("R", pattern);
+  for (auto* camera : {&left, &right}) {
+    for (cv::Mat& frame : *camera) {
+      frame.convertTo(frame, -1, 1.6);
+      frame = cv::min(frame, 230);
+    }
+  }
+  const auto cut = Reconstruct(left, right, pattern, *calibration, {});
+  ASSERT_FALSE(cut.ok());
+  EXPECT_THAT(cut.error().message, ::testing::HasSubstr("saturated"));
 }
 
 TEST_F(RealBoard, SaysThatTheProjectorIsNotLinearEnough) {

@@ -43,7 +43,7 @@ Eigen::Matrix3d RectifiedFromLeft(const StereoCalibration& rig) {
 }
 
 Result<Reconstruction> RunSmall(const StereoFrames& frames, Background background,
-                           const ReconstructionConfig& config) {
+                                const ReconstructionConfig& config) {
   return Reconstruct(frames.left, frames.right, SmallPattern(background), SmallRig(), config);
 }
 
@@ -164,15 +164,16 @@ TEST(Reconstruct, GivesTheSameBytesForAnyNumberOfThreads) {
 
 TEST(Reconstruct, MeasuresTheHarmonicAndRefusesItOnlyWithASharedBackground) {
   const Lighting bent = {.modulation_dn = 70, .noise_dn = 1, .second_harmonic = 0.12};
-  const auto own = RunSmall(Render(Plane(kNormal, kOffsetMm), SmallRig(), SmallPattern(Background::kOwn), bent),
-                       Background::kOwn, SmallConfig(1));
+  const auto own =
+      RunSmall(Render(Plane(kNormal, kOffsetMm), SmallRig(), SmallPattern(Background::kOwn), bent),
+               Background::kOwn, SmallConfig(1));
   ASSERT_TRUE(own.ok()) << own.error().message;
   EXPECT_NEAR(own->quality.left.trust.second_harmonic_ratio.value(), 0.12,
               0.005);                                                // noise over 20,000 pixels: 0.001
   EXPECT_NEAR(own->quality.left.trust.noise_dn.value(), 1.04, 0.1);  // 1 DN and the rounding
   const auto shared =
       RunSmall(Render(Plane(kNormal, kOffsetMm), SmallRig(), SmallPattern(Background::kShared), bent),
-          Background::kShared, SmallConfig(1));
+               Background::kShared, SmallConfig(1));
   ASSERT_FALSE(shared.ok());
   EXPECT_EQ(shared.error().code, ErrorCode::kUntrusted);
   EXPECT_THAT(shared.error().message, HasSubstr("not linear enough for a shared background"));
@@ -182,7 +183,7 @@ TEST(Reconstruct, SuspectsAWeakHarmonicToo) {
   const Lighting bent = {.noise_dn = 0.5, .second_harmonic = 0.04};
   const auto shared =
       RunSmall(Render(Plane(kNormal, kOffsetMm), SmallRig(), SmallPattern(Background::kShared), bent),
-          Background::kShared, SmallConfig(0.5));
+               Background::kShared, SmallConfig(0.5));
   ASSERT_FALSE(shared.ok());
   EXPECT_THAT(shared.error().message, HasSubstr("not linear enough"));
 }
@@ -197,7 +198,7 @@ TEST(Reconstruct, RefusesWhatCannotBeTrustedAndGoesOn) {
   EXPECT_THAT(reconstructor->Run(bright.left, bright.right).error().message, HasSubstr("saturated"));
   const auto dark = Render(Plane(kNormal, kOffsetMm), SmallRig(), pattern, {.modulation_dn = 2});
   EXPECT_THAT(reconstructor->Run(dark.left, dark.right).error().message, HasSubstr("no pixel shows fringes"));
-  EXPECT_FALSE(reconstructor->Run(good.left, good.left).ok());   // one camera twice
+  EXPECT_FALSE(reconstructor->Run(good.left, good.left).ok());  // one camera twice
   auto mixed_up = good;
   std::swap(mixed_up.left[1], mixed_up.left[6]);
   EXPECT_EQ(reconstructor->Run(mixed_up.left, mixed_up.right).error().code, ErrorCode::kUntrusted);
@@ -216,7 +217,8 @@ TEST(Reconstruct, RefusesWrongFrames) {
               HasSubstr("frame 4 has 320 x 100"));
   auto colour = good;
   colour.left[0] = cv::Mat(240, 320, CV_8UC3, cv::Scalar(0, 0, 0));
-  EXPECT_THAT(RunSmall(colour, Background::kOwn, SmallConfig(1)).error().message, HasSubstr("not a grey image"));
+  EXPECT_THAT(RunSmall(colour, Background::kOwn, SmallConfig(1)).error().message,
+              HasSubstr("not a grey image"));
   auto empty = good;
   empty.left[2] = cv::Mat();
   EXPECT_FALSE(RunSmall(empty, Background::kOwn, SmallConfig(1)).ok());
@@ -239,6 +241,83 @@ TEST(Reconstruct, TheProjectorBetraysADriftedCalibration) {
   const auto stale = Reconstruct(frames.left, frames.right, pattern, drifted, SmallConfig(1));
   ASSERT_FALSE(stale.ok());
   EXPECT_THAT(stale.error().message, HasSubstr("the calibration drifted"));
+}
+
+StereoFrames Flipped(const StereoFrames& frames, int how) {
+  StereoFrames flipped;
+  for (const auto& [from, to] :
+       {std::pair(&frames.left, &flipped.left), std::pair(&frames.right, &flipped.right)}) {
+    for (const cv::Mat& frame : *from) {
+      cv::flip(frame, to->emplace_back(), how);
+    }
+  }
+  return flipped;
+}
+
+// Without a calibrated projector, only its columns can tell.
+TEST(Reconstruct, RefusesExchangedAndMirroredImages) {
+  const PatternSet pattern = SmallPattern(Background::kOwn);
+  StereoCalibration rig = SmallRig();
+  rig.projector.reset();
+  for (const Surface& surface : {Plane(kNormal, kOffsetMm), Sphere(kCenterMm, kRadiusMm)}) {
+    const auto good = Render(surface, SmallRig(), pattern, {.noise_dn = 0.5});
+    const auto run = [&](const StereoFrames& frames) {
+      return Reconstruct(frames.left, frames.right, pattern, rig, SmallConfig(0.5));
+    };
+    const auto right = run(good);
+    ASSERT_TRUE(right.ok()) << right.error().message;
+    const auto& figures = right->quality.projector_consistency.value();
+    // px; a fringe image of B = 80 DN and noise of 0.6 DN knows its column to 0.02 px
+    EXPECT_LT(figures.column_rms_px, 0.04);
+    EXPECT_LT(figures.flat_parallax_px, 5 * figures.flat_column_rms_px);  // 2: the projector is half way
+    EXPECT_FALSE(run({.left = good.right, .right = good.left}).ok());
+    EXPECT_FALSE(run(Flipped(good, 1)).ok());   // left and right
+    EXPECT_FALSE(run(Flipped(good, -1)).ok());  // by half a turn
+  }
+}
+
+TEST(Reconstruct, RefusesACalibrationThatCannotBelongToTheFrames) {
+  const PatternSet pattern = SmallPattern(Background::kOwn);
+  const auto refusal = [&](const auto& change) {
+    StereoCalibration rig = SmallRig();
+    rig.image_size.reset();
+    change(rig);
+    const auto made = Reconstructor::Create(pattern, rig, {320, 240}, SmallConfig(0));
+    return made.ok() ? std::string("accepted") : made.error().message;
+  };
+  EXPECT_EQ(refusal([](StereoCalibration&) {}), "accepted");
+  EXPECT_THAT(refusal([](StereoCalibration& rig) { rig.left.camera_matrix.topRows(2) *= 2; }),
+              HasSubstr("the principal point of the left camera is at x = 322.6 px"));
+  EXPECT_THAT(refusal([](StereoCalibration& rig) { rig.right.camera_matrix(1, 2) = 20; }),
+              HasSubstr("the principal point of the right camera is at y = 20.0 px"));
+  EXPECT_THAT(refusal([](StereoCalibration& rig) { rig.right.camera_matrix(0, 0) = 50; }),
+              HasSubstr("the right camera would see 145.3 degrees"));
+  EXPECT_THAT(refusal([](StereoCalibration& rig) { rig.left.distortion[0] = 100; }),
+              HasSubstr("shifts a corner of the frame"));
+  EXPECT_THAT(refusal([](StereoCalibration& rig) { rig.left.distortion[0] = -6; }),
+              HasSubstr("folds the image over"));
+  EXPECT_THAT(refusal([](StereoCalibration& rig) { rig.right.distortion[1] = -100; }),
+              HasSubstr("folds the image over"));
+}
+
+TEST(Reconstruct, NoticesGreyValuesCutOffBelowFullScale) {
+  const PatternSet pattern = SmallPattern(Background::kOwn);
+  const auto good = Render(Plane(kNormal, kOffsetMm), SmallRig(), pattern, {.noise_dn = 1});
+  const auto cut_at = [&](double level_dn) {
+    StereoFrames cut = good;
+    for (auto* camera : {&cut.left, &cut.right}) {
+      for (cv::Mat& frame : *camera) {
+        frame = cv::min(frame, level_dn);
+      }
+    }
+    return RunSmall(cut, Background::kOwn, SmallConfig(1));
+  };
+  const auto whole = RunSmall(good, Background::kOwn, SmallConfig(1));
+  ASSERT_TRUE(whole.ok()) << whole.error().message;
+  EXPECT_FALSE(whole->quality.left.clipping_dn.has_value());
+  const auto cut = cut_at(150);  // A + B = 190
+  ASSERT_FALSE(cut.ok());
+  EXPECT_THAT(cut.error().message, HasSubstr("saturated"));
 }
 
 TEST(Reconstruct, SixteenBitFramesGiveTheSamePoints) {

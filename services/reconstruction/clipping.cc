@@ -1,0 +1,74 @@
+#include "services/reconstruction/clipping.h"
+
+#include <cstdint>
+#include <vector>
+
+#include "services/common/parallel_rows.h"
+
+namespace forgescan {
+namespace {
+
+constexpr int kRowStep = 4;
+using Histogram = std::vector<long>;
+
+template <typename Pixel>
+void CountRows(const cv::Mat& frame, Histogram& histogram) {
+  for (int row = 0; row < frame.rows; row += kRowStep) {
+    const Pixel* const grey = frame.ptr<Pixel>(row);
+    for (int column = 0; column < frame.cols; ++column) {
+      ++histogram[grey[column]];
+    }
+  }
+}
+
+Histogram Count(std::span<const cv::Mat> frames, const PatternSet& pattern, int threads) {
+  const bool is_narrow = frames[0].depth() == CV_8U;
+  const std::size_t values = is_narrow ? 256 : 65536;
+  std::vector<Histogram> by_frame(frames.size(), Histogram(values));
+  ParallelRows(threads, static_cast<int>(frames.size()), [&](int begin, int end) {
+    for (int i = begin; i < end; ++i) {
+      const auto at = static_cast<std::size_t>(i);
+      if (pattern.reference_frame_index == i) {
+        continue;
+      }
+      is_narrow ? CountRows<std::uint8_t>(frames[at], by_frame[at])
+                : CountRows<std::uint16_t>(frames[at], by_frame[at]);
+    }
+  });
+  Histogram sum(values);
+  for (const Histogram& histogram : by_frame) {
+    for (std::size_t value = 0; value < values; ++value) {
+      sum[value] += histogram[value];
+    }
+  }
+  return sum;
+}
+
+}  // namespace
+
+std::optional<int> FindClippingLevel(std::span<const cv::Mat> frames, const PatternSet& pattern,
+                                     int threads) {
+  constexpr double kMinShare = 1e-4;
+  constexpr double kMinExcess = 8;  // over the mean of the next lower values
+  constexpr int kBelow = 4;         // values that occur: 12-bit frames may hold multiples of 16 only
+  const Histogram histogram = Count(frames, pattern, threads);
+  long total = 0, below = 0, at_top = 0;
+  int top = -1, below_count = 0;
+  for (int value = static_cast<int>(histogram.size()) - 1; value >= 0; --value) {
+    const long count = histogram[static_cast<std::size_t>(value)];
+    total += count;
+    if (count > 0 && top < 0) {
+      top = value;
+      at_top = count;
+    } else if (count > 0 && below_count < kBelow) {
+      below += count;
+      ++below_count;
+    }
+  }
+  const bool is_cut = below_count == kBelow &&
+                      static_cast<double>(at_top) >= kMinShare * static_cast<double>(total) &&
+                      static_cast<double>(at_top) * kBelow >= kMinExcess * static_cast<double>(below);
+  return is_cut ? std::optional(top) : std::nullopt;
+}
+
+}  // namespace forgescan
