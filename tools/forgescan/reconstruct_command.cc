@@ -14,6 +14,7 @@
 #include "services/common/geometry/cloud_io.h"
 #include "services/reconstruction/reconstruct.h"
 #include "tools/forgescan/command.h"
+#include "tools/forgescan/output_files.h"
 
 namespace forgescan {
 namespace {
@@ -131,15 +132,19 @@ Status WriteJson(const std::filesystem::path& path, const nlohmann::json& json) 
 }
 
 Status RunReconstruct(const ReconstructArguments& arguments) {
+  ASSIGN_OR_RETURN(auto outputs, OutputFiles::Create({arguments.left, arguments.right, arguments.calibration,
+                                                      arguments.pattern},
+                                                     {arguments.out, arguments.json}));
   ASSIGN_OR_RETURN(const auto pattern, LoadPatternSet(arguments.pattern));
   ASSIGN_OR_RETURN(const auto calibration, LoadStereoCalibration(arguments.calibration));
   ASSIGN_OR_RETURN(const auto left, ReadFrames(arguments.left, pattern));
   ASSIGN_OR_RETURN(const auto right, ReadFrames(arguments.right, pattern));
   ASSIGN_OR_RETURN(const auto result, Reconstruct(left, right, pattern, calibration, arguments.config));
   if (!arguments.json.empty()) {
-    RETURN_IF_ERROR(WriteJson(arguments.json, ToJson(result)));
+    RETURN_IF_ERROR(WriteJson(outputs.Staged(arguments.json), ToJson(result)));
   }
-  return WritePly(arguments.out, result.cloud_in_camera);
+  RETURN_IF_ERROR(WritePly(outputs.Staged(arguments.out), result.cloud_in_camera));
+  return outputs.Commit();
 }
 
 }  // namespace
