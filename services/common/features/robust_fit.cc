@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <numbers>
+#include <utility>
 
 namespace forgescan {
 namespace {
@@ -15,6 +16,21 @@ constexpr double kLeastSagittaSigmas = 10;
 constexpr double kDegreesPerRadian = 180 / std::numbers::pi;
 
 }  // namespace
+
+Status Check(const RobustOptions& options) {
+  const std::pair<const char*, double> kPositive[] = {{"reject_sigmas", options.reject_sigmas},
+                                                      {"max_form_share", options.max_form_share},
+                                                      {"max_form_sigma_mm", options.max_form_sigma_mm}};
+  for (const auto& [name, value] : kPositive) {
+    if (!(value > 0) || !std::isfinite(value)) {
+      return Fail(ErrorCode::kInvalidArgument, "{} of a fit is {}, it must be finite and > 0", name, value);
+    }
+  }
+  if (options.max_rejected_share >= 0 && options.max_rejected_share < 1 && options.max_rounds > 0) return {};
+  return Fail(ErrorCode::kInvalidArgument,
+              "max_rejected_share of a fit is {}, allowed 0 to below 1; max_rounds is {}, allowed from 1",
+              options.max_rejected_share, options.max_rounds);
+}
 
 double RejectionLimit(std::vector<double>& absolute_residuals, double reject_sigmas) {
   if (absolute_residuals.empty()) return kRoundingMm;

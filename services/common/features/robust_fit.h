@@ -19,6 +19,9 @@ struct RobustOptions {
   double max_form_sigma_mm = 0.5;  // however large the shape: forged faces are some 0.1 mm rough
 };
 
+// Errors: kInvalidArgument with name, value and allowed range of the first wrong option.
+Status Check(const RobustOptions& options);
+
 // How a feature came out of its points. Shape: points = used + rejected.
 struct FitQuality {
   std::size_t points = 0;
@@ -56,6 +59,7 @@ Status CheckSagitta(const FitQuality& quality, double radius_mm, double half_arc
 template <typename Shape, typename Fit>
 Result<Shape> FitRobust(std::span<const Eigen::Vector3d> points, const RobustOptions& options,
                         const Fit& fit) {
+  RETURN_IF_ERROR(Check(options));
   std::vector<Eigen::Vector3d> used(points.begin(), points.end());
   ASSIGN_OR_RETURN(Shape shape, fit(used, static_cast<const Shape*>(nullptr)));
   std::vector<double> residuals(points.size()), sorted;
