@@ -16,6 +16,9 @@ constexpr double kPassingShare = 0.1;
 constexpr double kSettledShare = 0.1;  // a motion below this share of the biweight's width lets it narrow,
 constexpr double kNarrowing = 0.6;     // to this share of itself
 
+constexpr double kRigidTolerance = 1e-3;  // of the start's rotation; hand-written poses carry 5 digits
+constexpr double kLeastLeverMm = 1e-3;    // of a flat or straight model
+
 struct Progress {
   Eigen::Isometry3d model_from_scan;
   int iterations = 0;
@@ -34,16 +37,16 @@ Status CheckScan(const PointCloud& scan, const Eigen::Isometry3d& start) {
   }
   const Eigen::Matrix3d rotation = start.linear();
   const bool rigid = start.matrix().allFinite() && rotation.determinant() > 0 &&
-                     (rotation * rotation.transpose() - Eigen::Matrix3d::Identity()).norm() < 1e-3;
+                     (rotation * rotation.transpose() - Eigen::Matrix3d::Identity()).norm() < kRigidTolerance;
   if (rigid) return {};
   return Fail(ErrorCode::kInvalidArgument,
-              "the start pose is not a rigid motion (rotation orthonormal to 1e-3, finite)");
+              "the start pose is not a rigid motion (rotation orthonormal to {}, finite)", kRigidTolerance);
 }
 
 StepFrame FrameOf(const RegistrationModel& model) {
   const Eigen::Vector3d half = 0.5 * (model.box_high() - model.box_low());
   // A flat or straight model still needs a lever to scale with.
-  const auto across = [&](int i, int j) { return std::max(std::hypot(half[i], half[j]), 1e-3); };
+  const auto across = [&](int i, int j) { return std::max(std::hypot(half[i], half[j]), kLeastLeverMm); };
   return {model.center(), {across(1, 2), across(2, 0), across(0, 1)}};
 }
 

@@ -48,7 +48,7 @@ JudgedDimension Judge(const MeasuredDimension& from, const UncertaintyBudget& bu
   if (const std::string obstacle = Obstacle(from, cloud_degc); !obstacle.empty()) {
     return Unmeasured(from, obstacle);
   }
-  JudgedDimension to = Unmeasured(from, "");
+  JudgedDimension to = Unmeasured(from, from.reason);
   to.measured_mm = *from.measured_mm;
   to.deviation_mm = to.measured_mm - to.nominal_mm;
   to.temperature_degc = cloud_degc;
@@ -58,6 +58,9 @@ JudgedDimension Judge(const MeasuredDimension& from, const UncertaintyBudget& bu
   to.verdict = JudgeSize(to.measured_mm, to.uncertainty_mm, to.lower_mm, to.upper_mm);
   if (to.verdict == Verdict::kNotInspected) {
     to.reason = "The limits or the stated uncertainty of this dimension cannot be used.";
+  } else if (!from.reason.empty()) {
+    // A value with a reservation decides nothing, neither for the part nor against it.
+    to.verdict = Verdict::kNotDecidable;
   }
   return to;
 }

@@ -22,6 +22,7 @@ struct MeasuredDimension {
   double fit_uncertainty_mm = 0.0;                // standard uncertainty from the fits; NaN when not known
   int points = 0;
   double rejected_share = 0.0;  // 0..1
+  // Without a measured value: why. With one: what speaks against trusting it; the verdict is NOT_DECIDABLE.
   std::string reason;
 };
 

@@ -30,7 +30,7 @@ struct JudgedDimension {
   int points = 0;                 // used
   double rejected_share = 0.0;    // of the points of the feature, 0..1
   Verdict verdict = Verdict::kUnknown;
-  std::string reason;  // one sentence when there is no measured value, else empty
+  std::string reason;  // why there is no measured value, or what speaks against it; else empty
 };
 
 // Verdict on one size. Source: ISO 14253-1 with the expanded uncertainty U as guard band: OK if lower + U <=

@@ -1,12 +1,16 @@
+#include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "services/common/features/cylinder_fit.h"
 #include "services/common/features/plane_fit.h"
 #include "services/common/features/sphere_fit.h"
 #include "services/common/geometry/cloud_io.h"
 #include "tools/forgescan/command.h"
+#include "tools/forgescan/output_files.h"
 #include "tools/forgescan/text_output.h"
 
 namespace forgescan {
@@ -18,23 +22,36 @@ using Json = nlohmann::json;
 struct Arguments {
   std::string shape, cloud, json;
   std::vector<double> near_mm;
-  double radius_mm = 0;
+  std::optional<double> radius_mm;
   RobustOptions fit;
 };
 
 Json Vector(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
-Result<Points> TakePoints(const Arguments& arguments) {
-  ASSIGN_OR_RETURN(const PointCloud cloud, ReadPointCloud(arguments.cloud));
-  if (arguments.near_mm.empty() != !(arguments.radius_mm > 0)) {
-    return Fail(ErrorCode::kInvalidArgument, "--near and --radius (> 0 mm) go together");
+Status CheckNeighbourhood(const Arguments& arguments) {
+  if (arguments.near_mm.empty() != !arguments.radius_mm) {
+    return Fail(ErrorCode::kInvalidArgument, "--near and --radius go together, only one was given");
   }
+  if (!arguments.radius_mm) return {};
+  if (!(*arguments.radius_mm > 0) || !std::isfinite(*arguments.radius_mm)) {
+    return Fail(ErrorCode::kInvalidArgument, "--radius is {} mm, it must be finite and > 0",
+                *arguments.radius_mm);
+  }
+  const bool is_finite = std::all_of(arguments.near_mm.begin(), arguments.near_mm.end(),
+                                     [](double value) { return std::isfinite(value); });
+  if (is_finite && arguments.near_mm.size() == 3) return {};
+  return Fail(ErrorCode::kInvalidArgument,
+              "--near takes one place, three finite numbers x,y,z; {} were given", arguments.near_mm.size());
+}
+
+// The neighbourhood has passed its check; without one, all points.
+Points TakePoints(const PointCloud& cloud, const Arguments& arguments) {
   Points points;
   for (const Eigen::Vector3f& p : cloud.points) {
     const Eigen::Vector3d point = p.cast<double>();
-    if (!arguments.near_mm.empty() &&
+    if (arguments.radius_mm &&
         !((point - Eigen::Map<const Eigen::Vector3d>(arguments.near_mm.data())).norm() <=
-          arguments.radius_mm)) {
+          *arguments.radius_mm)) {
       continue;
     }
     points.push_back(point);
@@ -73,12 +90,18 @@ Result<Json> FitShape(const Arguments& arguments, const Points& points) {
 }
 
 Status Run(const Arguments& arguments) {
-  ASSIGN_OR_RETURN(const Points points, TakePoints(arguments));
-  ASSIGN_OR_RETURN(const Json json, FitShape(arguments, points));
+  ASSIGN_OR_RETURN(auto outputs, OutputFiles::Create({arguments.cloud}, {arguments.json}));
+  RETURN_IF_ERROR(CheckNeighbourhood(arguments));
+  ASSIGN_OR_RETURN(const CloudFromFile cloud, ReadPointCloud(arguments.cloud));
+  ASSIGN_OR_RETURN(Json json, FitShape(arguments, TakePoints(cloud, arguments)));
+  json["not_finite"] = cloud.not_finite;
   const std::string text = json.dump(2) + "\n";
-  if (!arguments.json.empty()) return WriteText(arguments.json, text);
-  std::fputs(text.c_str(), stdout);
-  return {};
+  if (arguments.json.empty()) {
+    std::fputs(text.c_str(), stdout);
+    return {};
+  }
+  RETURN_IF_ERROR(WriteText(outputs.Staged(arguments.json), text));
+  return outputs.Commit();
 }
 
 }  // namespace
@@ -92,10 +115,20 @@ void AddFitCommand(CLI::App& app, Status& outcome) {
   command->add_option("--cloud", arguments->cloud, "points, PLY or PCD, mm")->required();
   command->add_option("--near", arguments->near_mm, "x,y,z: only points about this place, mm")
       ->delimiter(',')
-      ->expected(3);
+      ->expected(1, CLI::detail::expected_max_vector_size);
   command->add_option("--radius", arguments->radius_mm, "of that neighbourhood, mm");
   command->add_option("--json", arguments->json, "where to write the result (default: standard output)");
   command->add_option("--reject-sigmas", arguments->fit.reject_sigmas, "points farther off are dropped")
+      ->capture_default_str();
+  command->add_option("--min-points", arguments->fit.min_points, "fewer used points are no fit")
+      ->capture_default_str();
+  command
+      ->add_option("--max-form-share", arguments->fit.max_form_share,
+                   "scatter against the radius, or the smaller spread of a plane; above, it is another shape")
+      ->capture_default_str();
+  command
+      ->add_option("--max-form-sigma-mm", arguments->fit.max_form_sigma_mm,
+                   "scatter of points of one shape, however large")
       ->capture_default_str();
   command->callback([arguments, &outcome] { outcome = Run(*arguments); });
 }

@@ -5,6 +5,7 @@
 #include "services/common/model/bundle_file.h"
 #include "services/common/model/model_import.h"
 #include "tools/forgescan/command.h"
+#include "tools/forgescan/output_files.h"
 
 namespace forgescan {
 namespace {
@@ -15,11 +16,13 @@ struct Arguments {
 };
 
 Status Import(const Arguments& arguments) {
-  ASSIGN_OR_RETURN(const ModelBundle bundle, LoadModel(arguments.file, arguments.import));
   const std::filesystem::path out = arguments.out.empty()
                                         ? std::filesystem::path(arguments.file).replace_extension(".bundle")
                                         : std::filesystem::path(arguments.out);
-  RETURN_IF_ERROR(WriteBundle(bundle, out));
+  ASSIGN_OR_RETURN(auto outputs, OutputFiles::Create({arguments.file}, {out}));
+  ASSIGN_OR_RETURN(const ModelBundle bundle, LoadModel(arguments.file, arguments.import));
+  RETURN_IF_ERROR(WriteBundle(bundle, outputs.Staged(out)));
+  RETURN_IF_ERROR(outputs.Commit());
   std::printf("%zu faces, %zu triangles, %zu samples, resolution %.3f mm, checksum %08x\n",
               bundle.faces.size(), bundle.triangles.size(), bundle.sample_points.size(), bundle.resolution_mm,
               bundle.checksum);

@@ -2,6 +2,7 @@
 // quality.
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -9,6 +10,7 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "services/common/geometry/cloud_io.h"
@@ -171,8 +173,12 @@ void AddReconstructCommand(CLI::App& app, Status& outcome) {
                       "Camera noise variance per grey value, 8-bit DN");
   command->add_option("--full-scale-16bit-dn", arguments->config.full_scale_16bit_dn,
                       "Largest value of 16-bit frames");
-  command->add_option("--threads", arguments->config.threads, "Threads to use");
-  command->callback([arguments, &outcome] { outcome = RunReconstruct(*arguments); });
+  command->add_option("--threads", arguments->config.threads, "0: all")->capture_default_str();
+  command->callback([arguments, &outcome] {
+    int& threads = arguments->config.threads;
+    if (threads == 0) threads = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+    outcome = RunReconstruct(*arguments);
+  });
 }
 
 }  // namespace forgescan

@@ -1,3 +1,4 @@
+#include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 
@@ -6,6 +7,7 @@
 #include "services/registration/classify.h"
 #include "services/registration/icp.h"
 #include "tools/forgescan/command.h"
+#include "tools/forgescan/output_files.h"
 #include "tools/forgescan/text_output.h"
 
 namespace forgescan {
@@ -27,7 +29,7 @@ nlohmann::json Matrix(const Eigen::Ref<const Eigen::MatrixXd>& m) {
   return rows;
 }
 
-std::string Json(const Registration& r, std::size_t points, std::size_t part_points) {
+std::string Json(const Registration& r, const CloudFromFile& scan, std::size_t part_points) {
   const nlohmann::json json = {{"model_from_scan", Matrix(r.model_from_scan.matrix())},
                                {"iterations", r.iterations},
                                {"considered", r.considered},
@@ -41,24 +43,34 @@ std::string Json(const Registration& r, std::size_t points, std::size_t part_poi
                                {"correction_rad", r.correction_rad},
                                {"covariance_rad_mm", Matrix(r.covariance)},
                                {"center_mm", {r.center.x(), r.center.y(), r.center.z()}},
-                               {"points", points},
+                               {"points", scan.size()},
+                               {"not_finite", scan.not_finite},
                                {"part_points", part_points}};
   return json.dump(2) + "\n";
 }
 
+std::vector<std::filesystem::path> Inputs(const Arguments& arguments) {
+  std::vector<std::filesystem::path> inputs = {arguments.scan, arguments.model};
+  if (!arguments.initial.empty()) inputs.emplace_back(arguments.initial);
+  return inputs;
+}
+
 Status Run(const Arguments& arguments) {
+  ASSIGN_OR_RETURN(auto outputs, OutputFiles::Create(Inputs(arguments), {arguments.out, arguments.json}));
   ASSIGN_OR_RETURN(const ModelBundle bundle, LoadModel(arguments.model, arguments.import));
   ASSIGN_OR_RETURN(const RegistrationModel model, RegistrationModel::Build(bundle));
-  ASSIGN_OR_RETURN(const PointCloud scan, ReadPointCloud(arguments.scan));
+  ASSIGN_OR_RETURN(const CloudFromFile scan, ReadPointCloud(arguments.scan));
   Eigen::Isometry3d start = Eigen::Isometry3d::Identity();
   if (!arguments.initial.empty()) {
     ASSIGN_OR_RETURN(start, ReadPose(arguments.initial));
   }
   ASSIGN_OR_RETURN(const Registration result, RegisterScan(scan, model, start, arguments.icp));
   const auto part = FindPartPoints(scan, model, result.model_from_scan, arguments.classify);
-  if (!arguments.json.empty())
-    RETURN_IF_ERROR(WriteText(arguments.json, Json(result, scan.size(), part.size())));
-  return WriteText(arguments.out, PoseText(result.model_from_scan));
+  if (!arguments.json.empty()) {
+    RETURN_IF_ERROR(WriteText(outputs.Staged(arguments.json), Json(result, scan, part.size())));
+  }
+  RETURN_IF_ERROR(WriteText(outputs.Staged(arguments.out), PoseText(result.model_from_scan)));
+  return outputs.Commit();
 }
 
 }  // namespace

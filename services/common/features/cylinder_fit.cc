@@ -22,6 +22,9 @@ constexpr int kDirections = 400;  // tried on the half sphere when there is no s
 constexpr std::size_t kTrialPoints = 500;
 constexpr int kCandidates = 5;  // best directions that are refined
 constexpr int kArcBins = 720;
+constexpr double kFullTurnDeg = 360;
+constexpr double kCoreShare =
+    0.1;  // of the mean count of the filled bins: a bin with fewer holds only strays
 constexpr double kLeastArcDeg = 10;  // for a radius: below, noise decides whether it is a cylinder or a plane
 
 struct System {
@@ -160,21 +163,48 @@ Result<CylinderFit> SearchStart(Points points) {
   return Fail(ErrorCode::kDegenerate, "no cylinder through the {} points from any direction", points.size());
 }
 
-double ArcDeg(Points points, const CylinderFit& c, double limit_mm) {
-  std::array<bool, kArcBins> seen{};
+// Points used in each of kArcBins directions about the axis.
+std::array<std::size_t, kArcBins> CountDirections(Points points, const CylinderFit& c, double limit_mm) {
+  std::array<std::size_t, kArcBins> counts{};
   const Eigen::Vector3d u = c.axis.unitOrthogonal(), v = c.axis.cross(u);
   for (const Eigen::Vector3d& p : points) {
     if (std::abs(c.Residual(p)) > limit_mm) continue;
     const double turn =
         std::atan2(v.dot(p - c.axis_point), u.dot(p - c.axis_point)) / (2 * std::numbers::pi) + 0.5;
-    seen[static_cast<std::size_t>(turn * kArcBins) % kArcBins] = true;
+    ++counts[static_cast<std::size_t>(turn * kArcBins) % kArcBins];
   }
+  return counts;
+}
+
+double ArcDeg(Points points, const CylinderFit& c, double reject_sigmas) {
+  std::vector<double> residuals;
+  for (const Eigen::Vector3d& p : points) residuals.push_back(std::abs(c.Residual(p)));
+  const auto counts = CountDirections(points, c, RejectionLimit(residuals, reject_sigmas));
+  std::size_t filled = 0, used = 0;
+  for (const std::size_t count : counts) {
+    filled += count > 0 ? 1U : 0U;
+    used += count;
+  }
+  const double least =
+      kCoreShare * static_cast<double>(used) / static_cast<double>(std::max<std::size_t>(filled, 1));
   int gap = 0, largest = 0;
   for (int i = 0; i < 2 * kArcBins; ++i) {
-    gap = seen[static_cast<std::size_t>(i % kArcBins)] ? 0 : gap + 1;
+    const std::size_t count = counts[static_cast<std::size_t>(i % kArcBins)];
+    gap = count > 0 && static_cast<double>(count) >= least ? 0 : gap + 1;
     largest = std::max(largest, std::min(gap, kArcBins));
   }
-  return 360.0 * (kArcBins - largest) / kArcBins;
+  return kFullTurnDeg * (kArcBins - largest) / kArcBins;
+}
+
+// Whether what is seen of the cylinder fixes its radius.
+Status CheckArc(const CylinderFit& c) {
+  if (c.radius_constrained) return {};
+  if (c.arc_deg < kLeastArcDeg) {
+    return Fail(ErrorCode::kDegenerate,
+                "the points cover an arc of {:.1f} degrees, a radius needs at least {}", c.arc_deg,
+                kLeastArcDeg);
+  }
+  return CheckSagitta(c.quality, c.radius_mm, c.arc_deg / kFullTurnDeg * std::numbers::pi, "cylinder");
 }
 
 Result<CylinderFit> FromStart(Points points, const std::optional<CylinderStart>& start) {
@@ -196,21 +226,16 @@ Result<CylinderFit> FromStart(Points points, const std::optional<CylinderStart>&
 
 Result<CylinderFit> FitCylinder(std::span<const Eigen::Vector3d> points,
                                 const std::optional<CylinderStart>& start, const RobustOptions& options) {
-  RETURN_IF_ERROR(CheckPoints(points, 5, "cylinder"));
+  constexpr std::size_t kUnknowns = 5;
+  RETURN_IF_ERROR(CheckPoints(points, std::max(kUnknowns, options.min_points), "cylinder"));
   ASSIGN_OR_RETURN(const CylinderFit first, FromStart(points, start));
   const auto fit = [&](const std::vector<Eigen::Vector3d>& used, const CylinderFit* before) {
     return GaussNewton(used, before != nullptr ? *before : first);
   };
   ASSIGN_OR_RETURN(CylinderFit cylinder, FitRobust<CylinderFit>(points, options, fit));
-  RETURN_IF_ERROR(CheckRoundness(cylinder.quality, cylinder.radius_mm, "cylinder"));
-  std::vector<double> residuals;
-  for (const Eigen::Vector3d& p : points) residuals.push_back(std::abs(cylinder.Residual(p)));
-  cylinder.arc_deg = ArcDeg(points, cylinder, RejectionLimit(residuals, options.reject_sigmas));
-  if (!cylinder.radius_constrained && cylinder.arc_deg < kLeastArcDeg) {
-    return Fail(ErrorCode::kDegenerate,
-                "the points cover an arc of {:.1f} degrees, a radius needs at least {}", cylinder.arc_deg,
-                kLeastArcDeg);
-  }
+  RETURN_IF_ERROR(CheckForm(cylinder.quality, cylinder.radius_mm, options, "cylinder"));
+  cylinder.arc_deg = ArcDeg(points, cylinder, options.reject_sigmas);
+  RETURN_IF_ERROR(CheckArc(cylinder));
   Eigen::Index largest = 0;
   cylinder.axis.cwiseAbs().maxCoeff(&largest);
   if (cylinder.axis[largest] < 0) cylinder.axis = -cylinder.axis;

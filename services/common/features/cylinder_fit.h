@@ -14,7 +14,8 @@ struct CylinderFit {
       Eigen::Vector3d::Zero();                     // on the axis, beside the centroid of the points used
   Eigen::Vector3d axis = Eigen::Vector3d::Zero();  // unit; sign: the largest component is positive
   double radius_mm = 0;
-  double arc_deg = 0;               // 360 less the largest gap between the points used, seen along the axis
+  double arc_deg = 0;  // 360 less the largest gap in the points used, seen along the axis; strays
+                       // do not fill a gap
   bool radius_constrained = false;  // the radius was given, not fitted
   // Of (axis_point along two directions across the axis, tilt towards them in rad, radius), as if the points
   // were independent. A constrained radius has variance 0.
@@ -36,8 +37,10 @@ struct CylinderStart {
 };
 
 // Gauss-Newton over the five parameters. Without a start, directions all over the half sphere are tried on a
-// sample of the points, each with an algebraic circle. Errors: kInvalidArgument (fewer than 5 points, not
-// finite, start not usable); kDegenerate if the points do not fix the axis or the radius; kNotConverged.
+// sample of the points, each with an algebraic circle. Errors: kInvalidArgument (fewer than
+// options.min_points, not finite, start not usable); kDegenerate if the points do not fix the axis or the
+// radius (an arc too short, or too flat for its scatter: CheckSagitta()); kUntrusted: CheckForm();
+// kNotConverged.
 Result<CylinderFit> FitCylinder(std::span<const Eigen::Vector3d> points,
                                 const std::optional<CylinderStart>& start, const RobustOptions& options);
 

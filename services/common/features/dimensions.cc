@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <numbers>
 
 #include "services/common/features/cylinder_fit.h"
 #include "services/common/features/plane_fit.h"
@@ -12,6 +13,10 @@ namespace forgescan {
 namespace {
 
 using Points = std::vector<Eigen::Vector3d>;
+
+constexpr double kDegreesPerRadian = 180 / std::numbers::pi;
+constexpr double kLeastEndFaceCosine = 0.9;  // to the datum axis, 26 degrees: above, it is no end face
+constexpr double kLeastDatumBaseMm = 1;      // summed arms of the datum's axis points: below, one place
 
 // A value with what it was made of; an Error instead becomes the reason of the result.
 struct Measurement {
@@ -73,7 +78,8 @@ class Evaluation {
     return plane;
   }
 
-  // The faces are one cylinder. Below min_arc_deg the radius stays nominal, and the fit says so.
+  // The faces are one cylinder. Below min_arc_deg the radius stays nominal, and the fit says so; a free fit
+  // that fails although the arc is long enough fails for good, with its own sentence.
   Result<CylinderFit> Cylinder(const std::vector<std::string>& names) const {
     Points points;
     const ModelFace* nominal = nullptr;
@@ -86,7 +92,9 @@ class Evaluation {
     auto fit = FitCylinder(points, start, options_.fit);
     if (fit.ok() && fit->arc_deg >= options_.min_arc_deg) return fit;
     start.keep_radius = true;
-    return FitCylinder(points, start, options_.fit);
+    auto constrained = FitCylinder(points, start, options_.fit);
+    if (fit.ok()) return constrained;
+    return constrained.ok() && constrained->arc_deg < options_.min_arc_deg ? constrained : fit;
   }
 
   Result<Axis> DatumAxis(const std::vector<std::string>& names) const {
@@ -108,7 +116,7 @@ class Evaluation {
       const Eigen::Vector3d arm = c - axis.point;
       sum += arm.dot(centers.front() - axis.point) < 0 ? -arm : arm;
     }
-    if (sum.norm() < 1)
+    if (sum.norm() < kLeastDatumBaseMm)
       return Fail(ErrorCode::kDegenerate, "the datum cylinders lie at one place, they give no axis");
     axis.direction = sum.normalized();
     return axis;
@@ -123,9 +131,9 @@ class Evaluation {
     for (std::size_t i = 0; i < 2; ++i) {
       ASSIGN_OR_RETURN(const PlaneFit plane, Plane(spec.faces[i]));
       const double cosine = plane.normal.dot(axis.direction);
-      if (std::abs(cosine) < 0.9) {
+      if (std::abs(cosine) < kLeastEndFaceCosine) {
         return Fail(ErrorCode::kDegenerate, "face '{}' stands at {:.1f} degrees to the datum axis",
-                    spec.faces[i], std::acos(std::min(std::abs(cosine), 1.0)) * 57.29577951308232);
+                    spec.faces[i], std::acos(std::min(std::abs(cosine), 1.0)) * kDegreesPerRadian);
       }
       at[i] = plane.normal.dot(plane.point - axis.point) / cosine;
       variance += std::pow(plane.OffsetUncertaintyMm(axis.point + at[i] * axis.direction) / cosine, 2);

@@ -20,6 +20,7 @@ Result<PlaneFit> FitOnce(std::span<const Eigen::Vector3d> points) {
     return Fail(ErrorCode::kDegenerate, "{} points lie on a line, a plane needs spread in two directions",
                 points.size());
   }
+  plane.spread_mm = std::sqrt(spread[1] / static_cast<double>(points.size()));
   plane.normal = eigen.eigenvectors().col(0);
   Eigen::Index largest = 0;
   plane.normal.cwiseAbs().maxCoeff(&largest);
@@ -40,12 +41,16 @@ double PlaneFit::OffsetUncertaintyMm(const Eigen::Vector3d& at) const {
 }
 
 Result<PlaneFit> FitPlane(std::span<const Eigen::Vector3d> points, const RobustOptions& options) {
-  RETURN_IF_ERROR(CheckPoints(points, 3, "plane"));
-  return FitRobust<PlaneFit>(points, options, [](const std::vector<Eigen::Vector3d>& used, const PlaneFit*) {
-    return used.size() < 3
+  constexpr std::size_t kUnknowns = 3;
+  RETURN_IF_ERROR(CheckPoints(points, std::max(kUnknowns, options.min_points), "plane"));
+  const auto fit = [](const std::vector<Eigen::Vector3d>& used, const PlaneFit*) {
+    return used.size() < kUnknowns
                ? Result<PlaneFit>(Fail(ErrorCode::kDegenerate, "fewer than 3 points are left for a plane"))
                : FitOnce(used);
-  });
+  };
+  ASSIGN_OR_RETURN(PlaneFit plane, FitRobust<PlaneFit>(points, options, fit));
+  RETURN_IF_ERROR(CheckForm(plane.quality, plane.spread_mm, options, "plane"));
+  return plane;
 }
 
 }  // namespace forgescan

@@ -12,6 +12,7 @@ struct PlaneFit {
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();  // unit; sign: the largest component is positive
   Eigen::Matrix3d covariance =
       Eigen::Matrix3d::Zero();  // of the normal, divided by sigma^2; see OffsetUncertaintyMm
+  double spread_mm = 0;  // standard deviation of the points used along their narrower direction in the plane
   FitQuality quality;
 
   double Residual(const Eigen::Vector3d& p) const { return normal.dot(p - point); }
@@ -20,8 +21,8 @@ struct PlaneFit {
   double OffsetUncertaintyMm(const Eigen::Vector3d& at) const;
 };
 
-// Errors: kInvalidArgument (fewer than 3 points, not finite); kDegenerate if the points lie on a line or in
-// one place.
+// Errors: kInvalidArgument (fewer than options.min_points, not finite); kDegenerate if the points lie on a
+// line or in one place; kUntrusted if they are not flat: see CheckForm().
 Result<PlaneFit> FitPlane(std::span<const Eigen::Vector3d> points, const RobustOptions& options);
 
 }  // namespace forgescan

@@ -1,6 +1,8 @@
 #include "services/common/features/robust_fit.h"
 
 #include <algorithm>
+#include <numbers>
+#include <utility>
 
 namespace forgescan {
 namespace {
@@ -8,9 +10,27 @@ namespace {
 constexpr double kMadToSigma = 1.4826;  // for normal residuals
 constexpr double kRoundingMm = 1e-6;    // keeps exact data from losing points to the last digit
 
-constexpr double kLargestSigmaShare = 0.1;  // of the radius
+// Least height of an arc over its chord, in sigmas. The bias of the radius falls with the square of this
+// ratio; at 10 it is about one percent, below 3 the radius is noise.
+constexpr double kLeastSagittaSigmas = 10;
+constexpr double kDegreesPerRadian = 180 / std::numbers::pi;
 
 }  // namespace
+
+Status Check(const RobustOptions& options) {
+  const std::pair<const char*, double> kPositive[] = {{"reject_sigmas", options.reject_sigmas},
+                                                      {"max_form_share", options.max_form_share},
+                                                      {"max_form_sigma_mm", options.max_form_sigma_mm}};
+  for (const auto& [name, value] : kPositive) {
+    if (!(value > 0) || !std::isfinite(value)) {
+      return Fail(ErrorCode::kInvalidArgument, "{} of a fit is {}, it must be finite and > 0", name, value);
+    }
+  }
+  if (options.max_rejected_share >= 0 && options.max_rejected_share < 1 && options.max_rounds > 0) return {};
+  return Fail(ErrorCode::kInvalidArgument,
+              "max_rejected_share of a fit is {}, allowed 0 to below 1; max_rounds is {}, allowed from 1",
+              options.max_rejected_share, options.max_rounds);
+}
 
 double RejectionLimit(std::vector<double>& absolute_residuals, double reject_sigmas) {
   if (absolute_residuals.empty()) return kRoundingMm;
@@ -30,11 +50,29 @@ Status CheckPoints(std::span<const Eigen::Vector3d> points, std::size_t needed, 
   return {};
 }
 
-Status CheckRoundness(const FitQuality& quality, double radius_mm, const char* feature) {
-  if (quality.sigma_mm <= kLargestSigmaShare * radius_mm) return {};
+Status CheckForm(const FitQuality& quality, double size_mm, const RobustOptions& options,
+                 const char* feature) {
+  if (quality.used() < options.min_points) {
+    return Fail(ErrorCode::kUntrusted, "{} of {} points are left for a {}, at least {} are needed",
+                quality.used(), quality.points, feature, options.min_points);
+  }
+  const double limit_mm = std::min(options.max_form_share * size_mm, options.max_form_sigma_mm);
+  if (quality.sigma_mm <= limit_mm) return {};
   return Fail(ErrorCode::kUntrusted,
-              "the points scatter by {:.3g} mm about a {} of radius {:.3g} mm: another shape",
-              quality.sigma_mm, feature, radius_mm);
+              "the points scatter by {:.3g} mm about a {} of size {:.3g} mm, at most {:.3g} mm are allowed: "
+              "another shape",
+              quality.sigma_mm, feature, size_mm, limit_mm);
+}
+
+Status CheckSagitta(const FitQuality& quality, double radius_mm, double half_arc_rad, const char* feature) {
+  const double sagitta_mm = radius_mm * (1 - std::cos(half_arc_rad));
+  const double least_mm = kLeastSagittaSigmas * quality.sigma_mm;
+  if (sagitta_mm >= least_mm) return {};
+  return Fail(
+      ErrorCode::kDegenerate,
+      "the points cover an arc of {:.1f} degrees of a {}, {:.3g} mm high; with a scatter of {:.3g} mm "
+      "a radius needs at least {:.3g} mm",
+      2 * half_arc_rad * kDegreesPerRadian, feature, sagitta_mm, quality.sigma_mm, least_mm);
 }
 
 }  // namespace forgescan

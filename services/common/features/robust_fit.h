@@ -14,7 +14,13 @@ struct RobustOptions {
   double reject_sigmas = 3;  // k; sigma is 1.4826 times the median of the absolute residuals
   int max_rounds = 10;
   double max_rejected_share = 0.5;  // above, the points are of another shape
+  std::size_t min_points = 10;  // used: twice the unknowns of a cylinder; fewer always fit, whatever they are
+  double max_form_share = 0.05;    // sigma against the size of the shape; above, it is another shape
+  double max_form_sigma_mm = 0.5;  // however large the shape: forged faces are some 0.1 mm rough
 };
+
+// Errors: kInvalidArgument with name, value and allowed range of the first wrong option.
+Status Check(const RobustOptions& options);
 
 // How a feature came out of its points. Shape: points = used + rejected.
 struct FitQuality {
@@ -34,9 +40,17 @@ double RejectionLimit(std::vector<double>& absolute_residuals, double reject_sig
 // Errors: kInvalidArgument for a point that is not finite, or fewer points than `needed`.
 Status CheckPoints(std::span<const Eigen::Vector3d> points, std::size_t needed, const char* feature);
 
-// Errors: kUntrusted if the residuals are no longer small against the radius: the points are of another
-// shape.
-Status CheckRoundness(const FitQuality& quality, double radius_mm, const char* feature);
+// Errors: kUntrusted if fewer than min_points are used, or if their residuals are no longer small against
+// size_mm (the radius, or the smaller spread of a plane's points) and max_form_sigma_mm: the points are of
+// another shape.
+Status CheckForm(const FitQuality& quality, double size_mm, const RobustOptions& options,
+                 const char* feature);
+
+// Errors: kDegenerate if the height of the piece of circle that is seen over its chord does not stand clear
+// of the scatter. Purpose: that height is all that tells the radius; noise of its order makes the radius too
+// small by an amount that more points do not reduce, and that no covariance tells. half_arc_rad: half the
+// angle seen from the centre.
+Status CheckSagitta(const FitQuality& quality, double radius_mm, double half_arc_rad, const char* feature);
 
 // Purpose: drop what lies beyond k sigma and refit, until none is left or max_rounds: every round judges all
 // points anew, so that a point dropped early can come back. Fit: (points used, shape before or nullptr) ->
@@ -45,6 +59,7 @@ Status CheckRoundness(const FitQuality& quality, double radius_mm, const char* f
 template <typename Shape, typename Fit>
 Result<Shape> FitRobust(std::span<const Eigen::Vector3d> points, const RobustOptions& options,
                         const Fit& fit) {
+  RETURN_IF_ERROR(Check(options));
   std::vector<Eigen::Vector3d> used(points.begin(), points.end());
   ASSIGN_OR_RETURN(Shape shape, fit(used, static_cast<const Shape*>(nullptr)));
   std::vector<double> residuals(points.size()), sorted;

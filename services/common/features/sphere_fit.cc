@@ -2,12 +2,15 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
+#include <algorithm>
 
 namespace forgescan {
 namespace {
 
 constexpr int kMaxSteps = 50;
 constexpr double kStopShare = 1e-9;  // of the radius
+constexpr double kCapTail = 0.02;    // of the points
 constexpr double kFlatShare =
     1e-9;  // weakest eigenvalue of the mean normal matrix: below, the cap is a plane
 
@@ -61,19 +64,49 @@ Result<SphereFit> GaussNewton(std::span<const Eigen::Vector3d> points, SphereFit
               points.size(), kMaxSteps);
 }
 
+// Half the opening of the cap that holds the points, seen from the centre. The last kCapTail of them do not
+// count: a few stray points must not make a cap look wider than the points that fix its radius.
+double HalfCapRad(std::span<const Eigen::Vector3d> points, const SphereFit& sphere, double limit_mm) {
+  std::vector<Eigen::Vector3d> directions;
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& p : points) {
+    if (std::abs(sphere.Residual(p)) > limit_mm) continue;
+    directions.push_back((p - sphere.center).normalized());
+    sum += directions.back();
+  }
+  const Eigen::Vector3d middle =
+      sum.normalized();  // of a full sphere: any direction, the opening is the same
+  std::vector<double> angles;
+  for (const Eigen::Vector3d& d : directions)
+    angles.push_back(std::atan2(d.cross(middle).norm(), d.dot(middle)));
+  const auto last = static_cast<std::ptrdiff_t>((1 - kCapTail) * static_cast<double>(angles.size()));
+  std::nth_element(angles.begin(), angles.begin() + last, angles.end());
+  return angles[static_cast<std::size_t>(last)];
+}
+
+Status CheckCap(std::span<const Eigen::Vector3d> points, const SphereFit& sphere, double reject_sigmas) {
+  std::vector<double> residuals;
+  for (const Eigen::Vector3d& p : points) residuals.push_back(std::abs(sphere.Residual(p)));
+  const double half_rad = HalfCapRad(points, sphere, RejectionLimit(residuals, reject_sigmas));
+  return CheckSagitta(sphere.quality, sphere.radius_mm, half_rad, "sphere");
+}
+
 }  // namespace
 
 Result<SphereFit> FitSphere(std::span<const Eigen::Vector3d> points, const RobustOptions& options) {
-  RETURN_IF_ERROR(CheckPoints(points, 4, "sphere"));
+  constexpr std::size_t kUnknowns = 4;
+  RETURN_IF_ERROR(CheckPoints(points, std::max(kUnknowns, options.min_points), "sphere"));
   const auto fit = [](const std::vector<Eigen::Vector3d>& used,
                       const SphereFit* before) -> Result<SphereFit> {
-    if (used.size() < 4) return Fail(ErrorCode::kDegenerate, "fewer than 4 points are left for a sphere");
+    if (used.size() < kUnknowns)
+      return Fail(ErrorCode::kDegenerate, "fewer than 4 points are left for a sphere");
     if (before != nullptr) return GaussNewton(used, *before);
     ASSIGN_OR_RETURN(const SphereFit start, AlgebraicStart(used));
     return GaussNewton(used, start);
   };
   ASSIGN_OR_RETURN(SphereFit sphere, FitRobust<SphereFit>(points, options, fit));
-  RETURN_IF_ERROR(CheckRoundness(sphere.quality, sphere.radius_mm, "sphere"));
+  RETURN_IF_ERROR(CheckForm(sphere.quality, sphere.radius_mm, options, "sphere"));
+  RETURN_IF_ERROR(CheckCap(points, sphere, options.reject_sigmas));
   sphere.covariance *= sphere.quality.sigma_mm * sphere.quality.sigma_mm;
   return sphere;
 }

@@ -17,8 +17,8 @@ struct SphereFit {
   double Residual(const Eigen::Vector3d& p) const { return (p - center).norm() - radius_mm; }
 };
 
-// Errors: kInvalidArgument (fewer than 4 points, not finite); kDegenerate if the points do not fix a sphere
-// (a plane); kNotConverged.
+// Errors: kInvalidArgument (fewer than options.min_points, not finite); kDegenerate if the points do not fix
+// a sphere (a plane, a cap too flat for its scatter: CheckSagitta()); kUntrusted: CheckForm(); kNotConverged.
 Result<SphereFit> FitSphere(std::span<const Eigen::Vector3d> points, const RobustOptions& options);
 
 }  // namespace forgescan

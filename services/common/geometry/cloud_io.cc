@@ -56,7 +56,7 @@ std::string EncodePly(const PointCloud& cloud) {
 
 }  // namespace
 
-Result<PointCloud> ReadPointCloud(const std::filesystem::path& path) {
+Result<CloudFromFile> ReadPointCloud(const std::filesystem::path& path) {
   ASSIGN_OR_RETURN(const std::string bytes, ReadFile(path));
   return ParsePointCloud(bytes, path.string());
 }

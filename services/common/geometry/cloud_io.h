@@ -10,12 +10,19 @@
 
 namespace forgescan {
 
+// A cloud as it was read, and how many points of the file are not in it: those with a coordinate that is not
+// finite.
+struct CloudFromFile : PointCloud {
+  std::size_t not_finite = 0;
+};
+
 // Reads a PLY file (ascii, binary of either byte order) or a PCD file (ascii, binary); the content decides,
 // not the name. Taken: x y z, the normal (nx ny nz or normal_x normal_y normal_z), sigma_mm, view; other
-// properties are skipped. A point with a coordinate that is not finite is dropped: both formats write "no
-// point" so. Units: as in the file, mm by house rule. Errors: kNotFound, kIo, kFormat; each names the file.
-// Cost: about 0.1 s per million points.
-Result<PointCloud> ReadPointCloud(const std::filesystem::path& path);
+// properties are skipped. A point with a coordinate that is not finite is left out and counted: both formats
+// write "no point" so. Units: as in the file, mm by house rule. Errors: kNotFound, kIo, kFormat; each names
+// the file. A file is taken whole or not at all: in ascii one line is one row with the header's columns, and
+// after the last row nothing follows. Cost: about 0.1 s per million points.
+Result<CloudFromFile> ReadPointCloud(const std::filesystem::path& path);
 
 // Reads the faces of a PLY file; a polygon becomes a fan of triangles. Errors: as above, and kFormat for a
 // file without faces, an index out of range or a vertex that is not finite.
@@ -27,7 +34,7 @@ Result<TriangleMesh> ReadTriangleMesh(const std::filesystem::path& path);
 Status WritePly(const std::filesystem::path& path, const PointCloud& cloud);
 
 // The same on bytes in memory; name is what an error calls them.
-Result<PointCloud> ParsePointCloud(std::string_view bytes, std::string_view name);
+Result<CloudFromFile> ParsePointCloud(std::string_view bytes, std::string_view name);
 Result<TriangleMesh> ParseTriangleMesh(std::string_view bytes, std::string_view name);
 
 }  // namespace forgescan

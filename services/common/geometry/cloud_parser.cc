@@ -1,8 +1,8 @@
-#include <array>
 #include <cmath>
-#include <limits>
+#include <optional>
 #include <utility>
 
+#include "services/common/geometry/cloud_builder.h"
 #include "services/common/geometry/cloud_io.h"
 #include "services/common/geometry/pcd_format.h"
 #include "services/common/geometry/ply_format.h"
@@ -10,99 +10,33 @@
 namespace forgescan {
 namespace {
 
-// What a cloud takes from a vertex, in this order.
-enum Column { kX, kY, kZ, kNormalX, kNormalY, kNormalZ, kSigma, kView, kColumns };
-constexpr std::array<std::pair<std::string_view, Column>, 11> kColumnNames = {{{"x", kX},
-                                                                               {"y", kY},
-                                                                               {"z", kZ},
-                                                                               {"nx", kNormalX},
-                                                                               {"ny", kNormalY},
-                                                                               {"nz", kNormalZ},
-                                                                               {"normal_x", kNormalX},
-                                                                               {"normal_y", kNormalY},
-                                                                               {"normal_z", kNormalZ},
-                                                                               {"sigma_mm", kSigma},
-                                                                               {"view", kView}}};
-
-int FindColumn(std::string_view property) {
-  for (const auto& [name, column] : kColumnNames) {
-    if (name == property) {
-      return column;
-    }
-  }
-  return -1;
-}
-
-// Collects vertices row by row into a cloud; knows from the header which columns come.
-class CloudBuilder {
- public:
-  void Expect(int column) {
-    if (column >= 0) {
-      has_[static_cast<std::size_t>(column)] = true;
-    }
-  }
-  bool has_points() const { return has_[kX] && has_[kY] && has_[kZ]; }
-
-  void Set(int column, double value) {
-    if (column >= 0) {
-      row_[static_cast<std::size_t>(column)] = value;
-    }
-  }
-  bool row_is_finite() const {
-    return std::isfinite(row_[kX]) && std::isfinite(row_[kY]) && std::isfinite(row_[kZ]);
-  }
-
-  void FinishRow() {
-    if (!row_is_finite()) {
-      return;
-    }
-    cloud_.points.push_back(At(kX));
-    if (has_[kNormalX] && has_[kNormalY] && has_[kNormalZ]) {
-      cloud_.normals.push_back(At(kNormalX));
-    }
-    if (has_[kSigma]) {
-      cloud_.sigma_mm.push_back(static_cast<float>(row_[kSigma]));
-    }
-    if (has_[kView]) {
-      constexpr double kMaxView = std::numeric_limits<std::uint16_t>::max();
-      const bool in_range = row_[kView] >= 0 && row_[kView] <= kMaxView;
-      view_is_valid_ = view_is_valid_ && in_range;
-      cloud_.view.push_back(in_range ? static_cast<std::uint16_t>(row_[kView]) : std::uint16_t{0});
-    }
-  }
-
-  Result<PointCloud> Finish(std::string_view name) && {
-    if (!view_is_valid_) {
-      return Fail(ErrorCode::kFormat, "{}: a view index is outside 0..65535", name);
-    }
-    return std::move(cloud_);
-  }
-
- private:
-  Eigen::Vector3f At(std::size_t first) const {
-    return Eigen::Vector3d(row_[first], row_[first + 1], row_[first + 2]).cast<float>();
-  }
-
-  std::array<bool, kColumns> has_{};
-  std::array<double, kColumns> row_{};
-  PointCloud cloud_;
-  bool view_is_valid_ = true;
-};
-
 Error Truncated(std::string_view name, std::string_view element, std::size_t row, std::size_t count) {
-  return Fail(ErrorCode::kFormat, "{}: {} {} of {} is cut off or not a number", name, element, row + 1,
-              count);
+  return Fail(ErrorCode::kFormat,
+              "{}: {} {} of {} is cut off, has more columns than the header, or holds what is not a number",
+              name, element, row + 1, count);
 }
 
-// Calls use(property index, value) for every scalar of a row; a list calls it for each of its entries.
+Status CheckEnd(const ScalarCursor& cursor, std::string_view name) {
+  if (cursor.AtEnd()) return {};
+  return Fail(ErrorCode::kFormat, "{}: {} bytes follow the last row that the header announces", name,
+              cursor.remaining_bytes());
+}
+
+Error Twice(std::string_view name, std::string_view property) {
+  return Fail(ErrorCode::kFormat, "{}: the header gives the column of {} twice", name, property);
+}
+
+// Calls use(property index, value) for every scalar of a row; a list calls it for each of its entries. False:
+// the row is not what the header says.
 template <typename Use>
 bool ReadPlyRow(const PlyElement& element, ScalarCursor& cursor, Use use) {
+  cursor.BeginRow();
   for (std::size_t p = 0; p < element.properties.size(); ++p) {
     const PlyProperty& property = element.properties[p];
     double entries = 1;
     if (property.is_list) {
       const auto count = cursor.Next(property.count_type);
-      if (!count || !(*count >= 0)) {
+      if (!count || !(*count >= 0) || *count != std::floor(*count)) {
         return false;
       }
       entries = *count;
@@ -115,11 +49,14 @@ bool ReadPlyRow(const PlyElement& element, ScalarCursor& cursor, Use use) {
       use(p, *value);
     }
   }
-  return true;
+  return cursor.EndRow();
 }
 
 Status SkipPlyElement(const PlyElement& element, ScalarCursor& cursor, std::string_view name) {
-  for (std::size_t row = 0; row < element.count && !element.properties.empty(); ++row) {
+  if (element.properties.empty() && element.count > 0) {
+    return Fail(ErrorCode::kFormat, "{}: element {} of the PLY header has no properties", name, element.name);
+  }
+  for (std::size_t row = 0; row < element.count; ++row) {
     if (!ReadPlyRow(element, cursor, [](std::size_t, double) {})) {
       return Truncated(name, element.name, row, element.count);
     }
@@ -127,12 +64,13 @@ Status SkipPlyElement(const PlyElement& element, ScalarCursor& cursor, std::stri
   return {};
 }
 
-Result<PointCloud> ReadPlyVertices(const PlyElement& element, ScalarCursor& cursor, std::string_view name) {
+Result<CloudFromFile> ReadPlyVertices(const PlyElement& element, ScalarCursor& cursor,
+                                      std::string_view name) {
   CloudBuilder builder;
   std::vector<int> columns;
   for (const auto& property : element.properties) {
     columns.push_back(property.is_list ? -1 : FindColumn(property.name));
-    builder.Expect(columns.back());
+    if (!builder.Expect(columns.back())) return Twice(name, property.name);
   }
   if (!builder.has_points()) {
     return Fail(ErrorCode::kFormat, "{}: its vertices have no x, y and z", name);
@@ -141,51 +79,70 @@ Result<PointCloud> ReadPlyVertices(const PlyElement& element, ScalarCursor& curs
     if (!ReadPlyRow(element, cursor, [&](std::size_t p, double value) { builder.Set(columns[p], value); })) {
       return Truncated(name, "vertex", row, element.count);
     }
-    builder.FinishRow();
+    RETURN_IF_ERROR(builder.FinishRow(name));
   }
-  return std::move(builder).Finish(name);
+  return std::move(builder).Finish();
 }
 
-Result<PointCloud> ParsePly(std::string_view bytes, std::string_view name) {
+Result<CloudFromFile> ParsePly(std::string_view bytes, std::string_view name) {
   ASSIGN_OR_RETURN(const PlyHeader header, ParsePlyHeader(bytes, name));
   ScalarCursor cursor(bytes.substr(header.body_offset), header.encoding);
+  std::optional<CloudFromFile> cloud;
   for (const auto& element : header.elements) {
     if (element.name == "vertex") {
-      return ReadPlyVertices(element, cursor, name);
+      ASSIGN_OR_RETURN(cloud, ReadPlyVertices(element, cursor, name));
+    } else {
+      RETURN_IF_ERROR(SkipPlyElement(element, cursor, name));
     }
-    RETURN_IF_ERROR(SkipPlyElement(element, cursor, name));
   }
-  return Fail(ErrorCode::kFormat, "{}: the PLY file has no vertex element", name);
+  if (!cloud) {
+    return Fail(ErrorCode::kFormat, "{}: the PLY file has no vertex element", name);
+  }
+  RETURN_IF_ERROR(CheckEnd(cursor, name));
+  return *std::move(cloud);
 }
 
-Result<PointCloud> ParsePcd(std::string_view bytes, std::string_view name) {
+// The column of the cloud that a field fills, or -1.
+int ColumnOf(const PcdField& field) { return field.count == 1 ? FindColumn(field.name) : -1; }
+
+bool ReadPcdRow(const PcdHeader& header, ScalarCursor& cursor, CloudBuilder& builder) {
+  cursor.BeginRow();
+  for (const auto& field : header.fields) {
+    for (std::size_t i = 0; i < field.count; ++i) {
+      const auto value = cursor.Next(field.type);
+      if (!value) return false;
+      builder.Set(ColumnOf(field), *value);
+    }
+  }
+  return cursor.EndRow();
+}
+
+Result<CloudFromFile> ParsePcd(std::string_view bytes, std::string_view name) {
   ASSIGN_OR_RETURN(const PcdHeader header, ParsePcdHeader(bytes, name));
   CloudBuilder builder;
   for (const auto& field : header.fields) {
-    builder.Expect(field.count == 1 ? FindColumn(field.name) : -1);
+    if (!builder.Expect(ColumnOf(field))) return Twice(name, field.name);
   }
   if (!builder.has_points()) {
     return Fail(ErrorCode::kFormat, "{}: its points have no x, y and z", name);
   }
   ScalarCursor cursor(bytes.substr(header.body_offset), header.encoding);
   for (std::size_t row = 0; row < header.points; ++row) {
-    for (const auto& field : header.fields) {
-      const int column = field.count == 1 ? FindColumn(field.name) : -1;
-      for (std::size_t i = 0; i < field.count; ++i) {
-        const auto value = cursor.Next(field.type);
-        if (!value) {
-          return Truncated(name, "point", row, header.points);
-        }
-        builder.Set(column, *value);
-      }
-    }
-    builder.FinishRow();
+    if (!ReadPcdRow(header, cursor, builder)) return Truncated(name, "point", row, header.points);
+    RETURN_IF_ERROR(builder.FinishRow(name));
   }
-  return std::move(builder).Finish(name);
+  RETURN_IF_ERROR(CheckEnd(cursor, name));
+  return std::move(builder).Finish();
 }
 
 Status AddFan(const std::vector<double>& polygon, std::string_view name, TriangleMesh& mesh) {
+  if (polygon.size() < 3) {
+    return Fail(ErrorCode::kFormat, "{}: a face has {} corners, at least 3 are needed", name, polygon.size());
+  }
   for (const double index : polygon) {
+    if (index != std::floor(index)) {
+      return Fail(ErrorCode::kFormat, "{}: a face names vertex {}, which is not a whole number", name, index);
+    }
     if (!(index >= 0 && index < static_cast<double>(mesh.vertices.size()))) {
       return Fail(ErrorCode::kFormat, "{}: a face names vertex {}, allowed 0..{}", name, index,
                   static_cast<double>(mesh.vertices.size()) - 1);
@@ -223,7 +180,7 @@ Status ReadPlyFaces(const PlyElement& element, ScalarCursor& cursor, std::string
 
 }  // namespace
 
-Result<PointCloud> ParsePointCloud(std::string_view bytes, std::string_view name) {
+Result<CloudFromFile> ParsePointCloud(std::string_view bytes, std::string_view name) {
   if (bytes.starts_with("ply")) {
     return ParsePly(bytes, name);
   }
@@ -254,6 +211,7 @@ Result<TriangleMesh> ParseTriangleMesh(std::string_view bytes, std::string_view 
       RETURN_IF_ERROR(SkipPlyElement(element, cursor, name));
     }
   }
+  RETURN_IF_ERROR(CheckEnd(cursor, name));
   if (mesh.triangles.empty()) {
     return Fail(ErrorCode::kFormat, "{}: has no faces", name);
   }

@@ -1,6 +1,7 @@
 #include "services/common/geometry/pcd_format.h"
 
 #include <charconv>
+#include <limits>
 #include <map>
 #include <optional>
 #include <sstream>
@@ -63,6 +64,23 @@ Result<Encoding> ParseEncoding(const std::vector<std::string>& words, std::strin
               words.empty() ? "missing" : words[0]);
 }
 
+// WIDTH and HEIGHT may be missing (older files); what is there must agree with POINTS.
+Status CheckGrid(const Lines& lines, std::size_t points, std::string_view name) {
+  std::size_t product = 1;
+  for (const char* key : {"WIDTH", "HEIGHT"}) {
+    const auto line = lines.find(key);
+    if (line == lines.end()) return {};
+    const auto side = line->second.size() == 1 ? ParseCount(line->second[0]) : std::nullopt;
+    if (!side || (*side > 0 && product > std::numeric_limits<std::size_t>::max() / *side)) {
+      return Fail(ErrorCode::kFormat, "{}: {} of the PCD header is not one count", name, key);
+    }
+    product *= *side;
+  }
+  if (product == points) return {};
+  return Fail(ErrorCode::kFormat, "{}: POINTS of the PCD header is {}, WIDTH times HEIGHT is {}", name,
+              points, product);
+}
+
 }  // namespace
 
 Result<PcdHeader> ParsePcdHeader(std::string_view bytes, std::string_view name) {
@@ -88,6 +106,7 @@ Result<PcdHeader> ParsePcdHeader(std::string_view bytes, std::string_view name) 
     return Fail(ErrorCode::kFormat, "{}: the PCD header has no POINTS count", name);
   }
   header.points = *points;
+  RETURN_IF_ERROR(CheckGrid(lines, header.points, name));
   return header;
 }
 

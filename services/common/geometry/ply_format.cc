@@ -70,11 +70,21 @@ Status AddHeaderLine(const std::vector<std::string>& words, std::string_view nam
   }
   if (words[0] == "element") {
     ASSIGN_OR_RETURN(auto element, ParseElement(words, name));
+    for (const PlyElement& known : header.elements) {
+      if (known.name == element.name) {
+        return Fail(ErrorCode::kFormat, "{}: the PLY header lists element {} twice", name, element.name);
+      }
+    }
     header.elements.push_back(std::move(element));
     return {};
   }
   if (words[0] == "property" && !header.elements.empty()) {
     ASSIGN_OR_RETURN(auto property, ParseProperty(words, name));
+    const PlyElement& element = header.elements.back();
+    if (element.Find(property.name) >= 0) {
+      return Fail(ErrorCode::kFormat, "{}: element {} of the PLY header lists property {} twice", name,
+                  element.name, property.name);
+    }
     header.elements.back().properties.push_back(std::move(property));
     return {};
   }

@@ -39,22 +39,43 @@ class ScalarCursor {
  public:
   ScalarCursor(std::string_view body, Encoding encoding) : body_(body), encoding_(encoding) {}
 
-  // nullopt: the body ended, or (ascii) the next word is not a number. Not-a-number and infinity are numbers
-  // here.
+  // Before and after the scalars of a row. In ascii a row is one line; binary rows have no border. EndRow:
+  // false if the line holds more words than were read.
+  void BeginRow() {
+    if (encoding_ == Encoding::kAscii) row_end_ = std::min(body_.find('\n', at_), body_.size());
+  }
+  bool EndRow() {
+    if (encoding_ != Encoding::kAscii) return true;
+    const bool complete =
+        body_.substr(at_, row_end_ - at_).find_first_not_of(kSpace) == std::string_view::npos;
+    at_ = std::min(row_end_ + 1, body_.size());
+    return complete;
+  }
+
+  // nullopt: the body (in ascii the row) ended, or the next word of an ascii row is not a number.
+  // Not-a-number and infinity are numbers here.
   std::optional<double> Next(ScalarType type) {
     return encoding_ == Encoding::kAscii ? NextWord() : NextBinary(type);
   }
 
   std::size_t remaining_bytes() const { return body_.size() - at_; }
 
+  // After the last row: nothing but blanks in ascii, not a byte in binary.
+  bool AtEnd() const {
+    return encoding_ == Encoding::kAscii ? body_.find_first_not_of(kSpace, at_) == std::string_view::npos
+                                         : remaining_bytes() == 0;
+  }
+
  private:
+  static constexpr std::string_view kSpace = " \t\r\n";
+
   std::optional<double> NextWord() {
-    constexpr std::string_view kSpace = " \t\r\n";
-    const std::size_t begin = body_.find_first_not_of(kSpace, at_);
+    const std::string_view row = body_.substr(0, row_end_);
+    const std::size_t begin = row.find_first_not_of(kSpace, at_);
     if (begin == std::string_view::npos) {
       return std::nullopt;
     }
-    const std::size_t end = std::min(body_.find_first_of(kSpace, begin), body_.size());
+    const std::size_t end = std::min(row.find_first_of(kSpace, begin), row.size());
     at_ = end;
     const char* first = body_.data() + begin + (body_[begin] == '+' ? 1 : 0);
     const char* last = body_.data() + end;
@@ -103,6 +124,7 @@ class ScalarCursor {
   std::string_view body_;
   Encoding encoding_;
   std::size_t at_ = 0;
+  std::size_t row_end_ = 0;  // ascii only: the byte after the row that BeginRow() opened
 };
 
 }  // namespace forgescan

@@ -1,18 +1,26 @@
 #include "services/common/model/step_import.h"
 
 #include <BRepAdaptor_Surface.hxx>
+#include <BRepBndLib.hxx>
 #include <BRepMesh_IncrementalMesh.hxx>
 #include <BRep_Tool.hxx>
+#include <Bnd_Box.hxx>
 #include <Eigen/Geometry>
+#include <Interface_Check.hxx>
+#include <Interface_CheckIterator.hxx>
+#include <Interface_InterfaceModel.hxx>
 #include <Message.hxx>
 #include <Message_Messenger.hxx>
 #include <Message_Printer.hxx>
 #include <Poly_Triangulation.hxx>
 #include <STEPControl_Reader.hxx>
 #include <Standard_Failure.hxx>
+#include <StepData_StepModel.hxx>
 #include <StepRepr_RepresentationItem.hxx>
+#include <StepShape_FaceSurface.hxx>
 #include <TCollection_HAsciiString.hxx>
 #include <TopExp.hxx>
+#include <TopExp_Explorer.hxx>
 #include <TopTools_IndexedMapOfShape.hxx>
 #include <TopoDS.hxx>
 #include <TopoDS_Face.hxx>
@@ -25,6 +33,10 @@
 
 namespace forgescan {
 namespace {
+
+// The largest side of a part's box. Outside, the file's length unit is not what it says.
+constexpr double kLeastPartMm = 0.1;
+constexpr double kLargestPartMm = 20'000;
 
 Eigen::Vector3d ToEigen(const gp_XYZ& v) { return {v.X(), v.Y(), v.Z()}; }
 
@@ -126,7 +138,6 @@ std::string UniqueName(const std::string& wanted, const std::string& type, std::
 Result<ModelBundle> Convert(const STEPControl_Reader& reader, const TopoDS_Shape& shape) {
   TopTools_IndexedMapOfShape faces;
   TopExp::MapShapes(shape, TopAbs_FACE, faces);
-  if (faces.IsEmpty()) return Fail(ErrorCode::kFormat, "the STEP file has no faces");
   ModelBundle bundle;
   std::set<std::string> used;
   for (int i = 1; i <= faces.Extent(); ++i) {
@@ -141,15 +152,75 @@ Result<ModelBundle> Convert(const STEPControl_Reader& reader, const TopoDS_Shape
   return bundle;
 }
 
+// What OpenCASCADE itself found wrong; it goes on without the entities concerned.
+Status CheckMessages(Interface_CheckIterator checks, const char* when) {
+  for (checks.Start(); checks.More(); checks.Next()) {
+    const Handle(Interface_Check) check = checks.Value();
+    if (check->NbFails() == 0) continue;
+    return Fail(ErrorCode::kFormat, "entity {} of the STEP file cannot be {}: {}", checks.Number(), when,
+                check->CFail(1));
+  }
+  return {};
+}
+
+// Every face the file lists must have arrived: a part with a face missing measures wrong.
+Status CheckFaces(const Handle(StepData_StepModel) & model, const TopoDS_Shape& shape) {
+  int listed = 0;
+  for (int i = 1; i <= model->NbEntities(); ++i) {
+    if (model->Value(i)->IsKind(STANDARD_TYPE(StepShape_FaceSurface))) ++listed;
+  }
+  TopTools_IndexedMapOfShape faces;
+  TopExp::MapShapes(shape, TopAbs_FACE, faces);
+  if (faces.IsEmpty()) return Fail(ErrorCode::kFormat, "the STEP file has no faces");
+  if (faces.Extent() >= listed) return {};
+  return Fail(ErrorCode::kFormat, "only {} of the {} faces in the STEP file have a usable shape",
+              faces.Extent(), listed);
+}
+
+Status CheckClosed(const TopoDS_Shape& shape) {
+  int number = 0;
+  for (TopExp_Explorer shells(shape, TopAbs_SHELL); shells.More(); shells.Next()) {
+    ++number;
+    if (BRep_Tool::IsClosed(shells.Current())) continue;
+    return Fail(ErrorCode::kFormat, "shell {} of the STEP file is open, a part must be closed", number);
+  }
+  if (number > 0 && !TopExp_Explorer(shape, TopAbs_FACE, TopAbs_SHELL).More()) return {};
+  return Fail(ErrorCode::kFormat, "the STEP file has faces that belong to no closed shell");
+}
+
+// Before the triangles: their number grows with the size of the part.
+Status CheckSize(const TopoDS_Shape& shape) {
+  Bnd_Box box;
+  BRepBndLib::Add(shape, box);
+  if (box.IsVoid()) return Fail(ErrorCode::kFormat, "the STEP file's shape has no extent");
+  const gp_XYZ side = box.CornerMax().XYZ() - box.CornerMin().XYZ();
+  const double largest_mm = std::max({side.X(), side.Y(), side.Z()});
+  if (largest_mm >= kLeastPartMm && largest_mm <= kLargestPartMm) return {};
+  return Fail(ErrorCode::kFormat,
+              "the part in the STEP file is {:.4g} mm long, allowed {} to {} mm: the file's unit is wrong",
+              largest_mm, kLeastPartMm, kLargestPartMm);
+}
+
+Result<TopoDS_Shape> TransferShape(STEPControl_Reader& reader, const std::filesystem::path& path) {
+  if (reader.ReadFile(path.c_str()) != IFSelect_RetDone) {
+    return Fail(ErrorCode::kFormat, "not a STEP file with geometry");
+  }
+  RETURN_IF_ERROR(CheckMessages(reader.WS()->ModelCheckList(), "read"));
+  if (reader.TransferRoots() == 0) return Fail(ErrorCode::kFormat, "not a STEP file with geometry");
+  RETURN_IF_ERROR(CheckMessages(reader.WS()->TransferReader()->LastCheckList(), "turned into a shape"));
+  TopoDS_Shape shape = reader.OneShape();
+  if (shape.IsNull()) return Fail(ErrorCode::kFormat, "the STEP file has no shape");
+  RETURN_IF_ERROR(CheckFaces(reader.StepModel(), shape));
+  RETURN_IF_ERROR(CheckClosed(shape));
+  RETURN_IF_ERROR(CheckSize(shape));
+  return shape;
+}
+
 Result<ModelBundle> ReadWithOcct(const std::filesystem::path& path, const TessellationOptions& options) {
   // OpenCASCADE reports progress on standard output, which belongs to our callers.
   Message::DefaultMessenger()->RemovePrinters(STANDARD_TYPE(Message_Printer));
   STEPControl_Reader reader;
-  if (reader.ReadFile(path.c_str()) != IFSelect_RetDone || reader.TransferRoots() == 0) {
-    return Fail(ErrorCode::kFormat, "not a STEP file with geometry");
-  }
-  const TopoDS_Shape shape = reader.OneShape();
-  if (shape.IsNull()) return Fail(ErrorCode::kFormat, "the STEP file has no shape");
+  ASSIGN_OR_RETURN(const TopoDS_Shape shape, TransferShape(reader, path));
   const BRepMesh_IncrementalMesh mesher(shape, options.chord_error_mm, false, options.angle_rad, false);
   if (!mesher.IsDone()) return Fail(ErrorCode::kDegenerate, "the STEP file's shape cannot be triangulated");
   ASSIGN_OR_RETURN(ModelBundle bundle, Convert(reader, shape));

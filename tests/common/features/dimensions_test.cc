@@ -116,6 +116,19 @@ TEST_F(DimensionsTest, SaysWhyADimensionCannotBeDetermined) {
   EXPECT_NE(results[2].reason.find("radius constrained"), std::string::npos) << results[2].reason;
 }
 
+// The radius may stay nominal only because the arc is short; any other trouble keeps its own sentence.
+TEST_F(DimensionsTest, ALongArcThatIsNoCylinderSaysSo) {
+  PointCloud cloud = ScanOf(*model_, {100'000, 0, 0.03, 14});
+  for (Eigen::Vector3f& p : cloud.points) {
+    // Oval by 1.5 mm: within reach of the face, but not round.
+    if (p.x() > 800 && p.x() < 943) p.z() *= 1 - 1.5F / 44.25F;
+  }
+  const auto results = Evaluate(cloud);
+  EXPECT_FALSE(results[2].measured_mm);
+  EXPECT_EQ(results[2].reason.find("arc"), std::string::npos) << results[2].reason;
+  EXPECT_NE(results[2].reason.find("another shape"), std::string::npos) << results[2].reason;
+}
+
 TEST_F(DimensionsTest, PlatesThatAreNotParallelHaveNoWidth) {
   PointCloud cloud = ScanOf(*model_, {100'000, 0, 0.03, 13});
   for (std::size_t i = 0; i < cloud.size(); ++i) {

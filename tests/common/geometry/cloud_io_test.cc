@@ -143,6 +143,72 @@ TEST(ParsePcd, TakesAsciiAndBinaryAndDropsMissingPoints) {
               HasSubstr("binary_compressed"));
 }
 
+std::string AsciiCloud(const std::string& properties, const std::string& rows) {
+  return "ply\nformat ascii 1.0\nelement vertex 2\n" + properties + "end_header\n" + rows;
+}
+constexpr char kXyz[] = "property float x\nproperty float y\nproperty float z\n";
+
+// What must not be read as points, and the words that say why.
+TEST(ParsePly, TakesAFileWholeOrNotAtAll) {
+  ASSERT_TRUE(ParsePointCloud(AsciiCloud(kXyz, "1 2 3\n4 5 6\n"), "cloud").ok());
+  ASSERT_TRUE(ParsePointCloud(AsciiCloud(kXyz, "1 2 3\r\n4 5 6\r\n\n"), "cloud").ok());
+  const std::string twice = std::string(kXyz) + "property float x\n";
+  const std::string alias = std::string(kXyz) + "property float nx\nproperty float normal_x\n";
+  const std::string view = std::string(kXyz) + "property ushort view\n";
+  const std::pair<std::string, const char*> kWrong[] = {
+      {AsciiCloud(kXyz, "1 2 3 9\n4 5 6\n"), "vertex 1 of 2"},
+      {AsciiCloud(kXyz, "1 2\n3 4 5 6\n"), "vertex 1 of 2"},
+      {AsciiCloud(kXyz, "1 2 3 4 5 6\n"), "vertex 1 of 2"},
+      {AsciiCloud(kXyz, "1 2 3\n\n4 5 6\n"), "vertex 2 of 2"},
+      {AsciiCloud(kXyz, "1 2 3\n4 5 6\n7 8 9\n"), "6 bytes follow"},
+      {AsciiCloud(kXyz, "1 2 3\n4 5 1e300\n"), "too large"},
+      {AsciiCloud(kXyz, "1 2 3\n4 5 1e400\n"), "vertex 2 of 2"},
+      {AsciiCloud(twice, "1 2 3 1\n4 5 6 4\n"), "property x twice"},
+      {AsciiCloud(alias, "1 2 3 0 0\n4 5 6 0 0\n"), "normal_x twice"},
+      {AsciiCloud(view, "1 2 3 0\n4 5 6 1.5\n"), "1.5 of point 2"},
+  };
+  for (const auto& [bytes, words] : kWrong) {
+    const auto cloud = ParsePointCloud(bytes, "cloud");
+    ASSERT_FALSE(cloud.ok()) << bytes;
+    EXPECT_THAT(cloud.error().message, HasSubstr(words));
+    EXPECT_THAT(cloud.error().message, HasSubstr("cloud: "));
+  }
+}
+
+TEST(ParsePly, RefusesFacesThatAreNoPolygons) {
+  for (const char* row : {"9 3 0 1 1.5", "9 2.5 0 1 2", "9 2 0 1", "9 3 0 1 2 3"}) {
+    std::string mesh = kAsciiMesh;
+    mesh.replace(mesh.find("9 3 0 1 2"), 9, row);
+    EXPECT_FALSE(ParseTriangleMesh(mesh, "mesh").ok()) << row;
+    // Of a cloud the faces are skipped, but not unread; what they name does not matter to it.
+    const bool is_table = std::string(row) != "9 2.5 0 1 2" && std::string(row) != "9 3 0 1 2 3";
+    EXPECT_EQ(ParsePointCloud(mesh, "mesh").ok(), is_table) << row;
+  }
+  EXPECT_FALSE(ParseTriangleMesh(std::string(kAsciiMesh) + "9 3 0 1 2\n", "mesh").ok());
+}
+
+TEST(ParsePly, CountsPointsThatAreNotFinite) {
+  const auto cloud = ParsePointCloud(AsciiCloud(kXyz, "1 2 3\n4 nan 6\n"), "cloud");
+  ASSERT_TRUE(cloud.ok()) << cloud.error().message;
+  EXPECT_EQ(cloud->size(), 1U);
+  EXPECT_EQ(cloud->not_finite, 1U);
+}
+
+TEST(ParsePcd, CountsMustAgree) {
+  const auto file = [](const std::string& counts, const std::string& rows) {
+    return "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\n" + counts + "DATA ascii\n" + rows;
+  };
+  const std::string two = "1 2 3\n4 5 6\n";
+  EXPECT_TRUE(ParsePointCloud(file("WIDTH 1\nHEIGHT 2\nPOINTS 2\n", two), "c").ok());
+  EXPECT_TRUE(ParsePointCloud(file("POINTS 2\n", two), "c").ok());
+  EXPECT_THAT(ParsePointCloud(file("WIDTH 3\nHEIGHT 1\nPOINTS 2\n", two), "c").error().message,
+              HasSubstr("WIDTH times HEIGHT is 3"));
+  EXPECT_THAT(ParsePointCloud(file("WIDTH 1\nHEIGHT 1\nPOINTS 1\n", two), "c").error().message,
+              HasSubstr("6 bytes follow"));
+  EXPECT_FALSE(ParsePointCloud(file("POINTS 3\n", two), "c").ok());
+  EXPECT_FALSE(ParsePointCloud(file("POINTS 2\n", "1 2 3 4\n5 6\n"), "c").ok());
+}
+
 TEST(ReadPointCloud, NamesWhatIsNotThere) {
   const auto cloud = ReadPointCloud("/nonexistent/cloud.ply");
   EXPECT_EQ(cloud.error().code, ErrorCode::kNotFound);

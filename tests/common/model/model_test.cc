@@ -4,7 +4,9 @@
 #include <cmath>
 #include <cstring>
 #include <fstream>
+#include <functional>
 #include <limits>
+#include <sstream>
 
 #include "services/common/model/bundle_file.h"
 #include "services/common/model/features.h"
@@ -158,6 +160,68 @@ TEST(ModelTest, StepTrianglesFaceOutwardsAndHoldTheChordError) {
     Eigen::Vector3f middle = Eigen::Vector3f::Zero();
     for (const auto v : model->triangles[i]) middle += model->vertices[v] / 3;
     EXPECT_NEAR(std::hypot(middle.y(), middle.z()), 44.85, 0.0055);  // mm, chord error and single precision
+  }
+}
+
+// The axle's STEP file, damaged and then read.
+Result<ModelBundle> ReadDamaged(const std::function<void(std::string&)>& damage) {
+  const auto path =
+      std::filesystem::temp_directory_path() / fmt::format("forgescan_damaged_{}.step", ::getpid());
+  RETURN_IF_ERROR(testing::WriteAxleStep({}, path));
+  std::ostringstream text;
+  text << std::ifstream(path).rdbuf();
+  std::string bytes = text.str();
+  damage(bytes);
+  std::ofstream(path, std::ios::trunc) << bytes;
+  auto model = LoadModel(path, {});
+  std::filesystem::remove(path);
+  return model;
+}
+
+std::string WhyRefused(const std::function<void(std::string&)>& damage) {
+  const auto model = ReadDamaged(damage);
+  return model.ok() ? "not refused" : model.error().message;
+}
+
+// The entity of this type that comes first, "#12 = TYPE(...);".
+std::pair<std::size_t, std::size_t> FirstEntity(const std::string& bytes, const std::string& type) {
+  const std::size_t begin = bytes.rfind('\n', bytes.find(type + "(")) + 1;
+  return {begin, bytes.find(";", begin) + 1 - begin};
+}
+
+TEST(ModelTest, RefusesAStepFileOfWhichAPartIsMissing) {
+  ASSERT_TRUE(ReadDamaged([](std::string&) {}).ok());
+  const std::string without_face = WhyRefused([](std::string& bytes) {
+    const auto [begin, length] = FirstEntity(bytes, "ADVANCED_FACE");
+    bytes.erase(begin, length);
+  });
+  EXPECT_NE(without_face.find("cannot be read"), std::string::npos) << without_face;
+  const std::string negative_radius = WhyRefused([](std::string& bytes) {
+    const auto [begin, length] = FirstEntity(bytes, "CYLINDRICAL_SURFACE");
+    const std::size_t comma = bytes.rfind(',', begin + length);
+    bytes.replace(comma, begin + length - comma, ",-1.);");
+  });
+  EXPECT_EQ(negative_radius.find("not refused"), std::string::npos);
+  EXPECT_NE(negative_radius.find("STEP file"), std::string::npos) << negative_radius;
+}
+
+TEST(ModelTest, RefusesAnOpenShell) {
+  const std::string open = WhyRefused([](std::string& bytes) {
+    const auto [begin, length] = FirstEntity(bytes, "CLOSED_SHELL");
+    const std::size_t list = bytes.find("(#", begin);  // the first of its faces goes
+    bytes.erase(list + 1, bytes.find('#', list + 2) - list - 1);
+  });
+  EXPECT_NE(open.find("face"), std::string::npos) << open;
+  EXPECT_EQ(open.find("not refused"), std::string::npos);
+}
+
+TEST(ModelTest, RefusesAPartOfAnImpossibleSize) {
+  for (const char* unit : {"$", ".MEGA."}) {
+    const std::string why = WhyRefused([unit](std::string& bytes) {
+      const std::size_t at = bytes.find("SI_UNIT(.MILLI.,.METRE.)");
+      bytes.replace(at + 8, 7, unit);
+    });
+    EXPECT_NE(why.find("unit is wrong"), std::string::npos) << why;
   }
 }
 

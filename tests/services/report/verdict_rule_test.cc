@@ -44,6 +44,25 @@ TEST(JudgeSize, WhatIsNotANumberIsNotInspected) {
   EXPECT_EQ(JudgeSize(1.5, 0.1, 2.0, 1.0), Verdict::kNotInspected);
 }
 
+// A size that came out well inside its limits, but from points of which many were thrown away.
+TEST(JudgeDimensions, AReservationIsToldAndDecidesNothing) {
+  MeasuredDimension dimension;
+  dimension.name = "width";
+  dimension.nominal_mm = 11;
+  dimension.lower_mm = 10;
+  dimension.upper_mm = 12;
+  dimension.measured_mm = 11.0;
+  EXPECT_EQ(JudgeDimensions(std::vector{dimension}, {}, 0)[0].verdict, Verdict::kOk);
+  dimension.reason = "8.0 % of the points were rejected as outliers";
+  for (const double size_mm : {11.0, 20.0}) {
+    dimension.measured_mm = size_mm;
+    const JudgedDimension judged = JudgeDimensions(std::vector{dimension}, {}, 0)[0];
+    EXPECT_EQ(judged.verdict, Verdict::kNotDecidable);
+    EXPECT_EQ(judged.reason, dimension.reason);
+    EXPECT_EQ(judged.measured_mm, size_mm);
+  }
+}
+
 JudgedDimension Named(const std::string& name, Verdict verdict) {
   JudgedDimension dimension;
   dimension.name = name;

@@ -109,10 +109,17 @@ TEST_F(Cli, FitsAPlaneNearAPlace) {
 }
 
 TEST_F(Cli, FitRefusesWhatDoesNotDetermineTheShape) {
-  WriteCloud("line.ply", {{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {3, 0, 0}, {4, 0, 0}, {5, 0, 0}, {6, 0, 0}});
-  for (const char* shape : {"plane", "sphere", "cylinder"}) {
-    ExpectRefusal(std::string("fit ") + shape + " --cloud line.ply --json out.json", "");
-  }
+  std::vector<Eigen::Vector3f> line;
+  for (int i = 0; i < 20; ++i) line.emplace_back(static_cast<float>(i), 0.F, 0.F);
+  WriteCloud("line.ply", line);
+  ExpectRefusal("fit plane --cloud line.ply --json out.json", "20 points lie on a line");
+  ExpectRefusal("fit sphere --cloud line.ply --json out.json", "do not fix a sphere");
+  ExpectRefusal("fit cylinder --cloud line.ply --json out.json", "no cylinder through the 20 points");
+  line.resize(3);
+  WriteCloud("three.ply", line);
+  ExpectRefusal("fit plane --cloud three.ply --json out.json", "3 points, a plane needs at least 10");
+  WriteCloud("c.ply", HalfCylinder());
+  ExpectRefusal("fit plane --cloud c.ply --json out.json", "another shape");
   ExpectRefusal("fit plane --cloud nothing.ply --json out.json", "nothing.ply");
 }
 
@@ -127,16 +134,146 @@ TEST_F(Cli, TruncatedAndForeignFilesAreRefused) {
   ExpectRefusal("model import text.step --out out.bundle", "text.step");
 }
 
+TEST_F(Cli, FitRefusesWhatIsNoNeighbourhood) {
+  WriteCloud("c.ply", HalfCylinder());
+  const std::string fit = "fit cylinder --cloud c.ply --json out.json ";
+  ExpectRefusal(fit + "--radius 5", "--near and --radius go together");
+  ExpectRefusal(fit + "--near 1,2,3", "--near and --radius go together");
+  ExpectRefusal(fit + "--near 1,2,3 --radius -5", "--radius is -5 mm");
+  ExpectRefusal(fit + "--near 1,2,3 --radius nan", "--radius is nan mm");
+  ExpectRefusal(fit + "--near 1,2,nan --radius 5", "three finite numbers");
+  ExpectRefusal(fit + "--near 1,2,3 --near 4,5,6 --radius 5", "6 were given");
+  ExpectRefusal(fit + "--reject-sigmas nan", "reject_sigmas of a fit is nan");
+}
+
+TEST_F(Cli, FitCountsPointsThatAreNotFinite) {
+  std::vector<Eigen::Vector3f> points = HalfCylinder();
+  points[3].x() = std::nanf("");
+  WriteCloud("c.ply", points);
+  ASSERT_EQ(Call("fit cylinder --cloud c.ply --json f.json").exit_code, 0);
+  EXPECT_EQ(ReadJson("f.json")["not_finite"].get<int>(), 1);
+}
+
+// An output that cannot be written, or would destroy an input, stops the command before it begins.
+TEST_F(Cli, OutputsAreCheckedBeforeTheWork) {
+  WriteCloud("c.ply", HalfCylinder());
+  const auto bytes = fs::file_size(folder_ / "c.ply");
+  ExpectRefusal("fit cylinder --cloud c.ply --json c.ply", "is both input and output");
+  ExpectRefusal("fit cylinder --cloud c.ply --json ./c.ply", "is both input and output");
+  EXPECT_EQ(fs::file_size(folder_ / "c.ply"), bytes);
+  ExpectRefusal("fit cylinder --cloud c.ply --json nowhere/out.json", "its folder does not exist");
+  fs::create_directory(folder_ / "taken");
+  ExpectRefusal("fit cylinder --cloud c.ply --json taken", "is a folder");
+}
+
+TEST_F(Cli, ARefusalLeavesNoOldResult) {
+  std::ofstream(folder_ / "out.json") << "{}";
+  std::ofstream(folder_ / "out.txt") << "1 0 0 0";
+  ExpectRefusal("register --scan nothing.ply --model nothing.stl --out out.txt --json out.json",
+                "nothing.stl");
+  std::ofstream(folder_ / "out.bundle") << "old";
+  ExpectRefusal("model import nothing.stl --out out.bundle", "nothing.stl");
+}
+
+// A block of 200 x 120 x 60 mm about the origin; no two of its sides are equal.
+const Eigen::Vector3d kHalfBlock(100, 60, 30);
+
+std::string BlockStl() {
+  std::string text = "solid block\n";
+  const int kCorners[12][3] = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
+                               {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
+  for (const auto& corners : kCorners) {
+    text += "facet normal 0 0 0\nouter loop\n";
+    for (const int i : corners) {
+      const Eigen::Vector3d p = kHalfBlock.cwiseProduct(
+          Eigen::Vector3d((i & 1) != 0 ? 1 : -1, (i & 2) != 0 ? 1 : -1, (i & 4) != 0 ? 1 : -1));
+      text += fmt::format("vertex {} {} {}\n", p.x(), p.y(), p.z());
+    }
+    text += "endloop\nendfacet\n";
+  }
+  return text + "endsolid block\n";
+}
+
+// Points all over the block with 0.02 mm of noise, moved by `shift_mm`.
+std::vector<Eigen::Vector3f> BlockScan(const Eigen::Vector3d& shift_mm) {
+  std::mt19937 random(2);
+  std::uniform_real_distribution<double> place(-1.0, 1.0);
+  std::normal_distribution<double> noise(0.0, 0.02);
+  std::vector<Eigen::Vector3f> points;
+  for (int i = 0; i < 12'000; ++i) {
+    Eigen::Vector3d p = kHalfBlock.cwiseProduct(Eigen::Vector3d(place(random), place(random), place(random)));
+    const int axis = i % 3;
+    p[axis] = (i % 6 < 3 ? 1 : -1) * (kHalfBlock[axis] + noise(random));
+    points.emplace_back((p + shift_mm).cast<float>());
+  }
+  return points;
+}
+
+TEST_F(Cli, RegistersAPart) {
+  std::ofstream(folder_ / "block.stl") << BlockStl();
+  WriteCloud("scan.ply", BlockScan({1.5, -0.8, 0.6}));
+  const std::string call = "register --scan scan.ply --model block.stl --spacing-mm 2 ";
+  const Output output = Call(call + "--out pose.txt --json r.json --threads 0");
+  ASSERT_EQ(output.exit_code, 0) << output.text;
+  const Json result = ReadJson("r.json");
+  const Eigen::Vector3d expected(-1.5, 0.8, -0.6);
+  std::ifstream pose(folder_ / "pose.txt");
+  for (std::size_t row = 0; row < 3; ++row) {
+    for (std::size_t column = 0; column < 4; ++column) {
+      double number = 0;
+      ASSERT_TRUE(pose >> number);
+      EXPECT_NEAR(number, result["model_from_scan"][row][column].get<double>(), 1e-9);
+    }
+    // mm: 0.02 / sqrt(2000 points a side) = 0.0005, ten of it.
+    EXPECT_NEAR(result["model_from_scan"][row][3].get<double>(), expected[static_cast<Eigen::Index>(row)],
+                0.005);
+  }
+  EXPECT_EQ(result["not_finite"].get<int>(), 0);
+  EXPECT_EQ(result["points"].get<int>(), 12'000);
+  ASSERT_EQ(Call(call + "--out pose2.txt --json r2.json --threads 2").exit_code, 0);
+  EXPECT_EQ(ReadJson("r2.json"), result);  // for any number of threads
+}
+
+TEST_F(Cli, RegisterRefusesWhatItCannotTrust) {
+  std::ofstream(folder_ / "block.stl") << BlockStl();
+  WriteCloud("far.ply", BlockScan({4000, 0, 0}));
+  const std::string outputs = " --model block.stl --spacing-mm 2 --out out.txt --json out.json";
+  ExpectRefusal("register --scan far.ply" + outputs, "0 of 12000 scan points lie within");
+  WriteCloud("scan.ply", BlockScan({0, 0, 0}));
+  std::ofstream(folder_ / "pose.txt") << "1 0 0 0 0 1 0 0 0 0 1 0";
+  ExpectRefusal("register --scan scan.ply --initial pose.txt" + outputs, "number 13 of the 16");
+  ExpectRefusal("register --scan scan.ply --model block.stl --out out.txt --json out.txt",
+                "two outputs would be written");
+  ExpectRefusal("register --scan scan.ply --model block.stl --out scan.ply", "is both input and output");
+  ExpectRefusal("register --scan scan.ply --model block.stl --out nowhere/out.txt",
+                "its folder does not exist");
+  EXPECT_TRUE(fs::exists(folder_ / "scan.ply"));
+}
+
+TEST_F(Cli, ImportsAModelButNotOverItself) {
+  std::ofstream(folder_ / "block.stl") << BlockStl();
+  const Output output = Call("model import block.stl --spacing-mm 4");
+  ASSERT_EQ(output.exit_code, 0) << output.text;
+  EXPECT_NE(output.text.find("12 triangles"), std::string::npos) << output.text;
+  ExpectRefusal("model import block.bundle", "is both input and output");
+  EXPECT_TRUE(fs::exists(folder_ / "block.bundle"));
+}
+
 TEST_F(Cli, ReconstructNamesWhatIsMissing) {
   ExpectRefusal(
       "reconstruct --left L --right R --calibration s.yaml --pattern p.toml --out out.ply --json out.json",
-      "");
+      "p.toml");
   std::ofstream(folder_ / "p.toml") << "projector_width_px = 1280\nbackground = \"own\"\n";
   std::ofstream(folder_ / "s.yaml") << "%YAML:1.0\n---\nrms: 0.1\n";
-  ExpectRefusal("reconstruct --left L --right R --calibration s.yaml --pattern p.toml --out out.ply", "");
+  ExpectRefusal("reconstruct --left L --right R --calibration s.yaml --pattern p.toml --out out.ply",
+                "p.toml");
 }
 
-TEST_F(Cli, AnUnknownCommandIsAUsageError) { EXPECT_NE(Call("melt").exit_code, 0); }
+TEST_F(Cli, AnUnknownCommandIsAUsageError) {
+  const Output output = Call("melt");
+  EXPECT_NE(output.exit_code, 0);
+  EXPECT_NE(output.text.find("subcommand is required"), std::string::npos) << output.text;
+}
 
 }  // namespace
 }  // namespace forgescan
