@@ -74,7 +74,7 @@ class ReconstructCli : public ::testing::Test {
 TEST_F(ReconstructCli, WritesCloudAndFigures) {
   const Output output = Call(left_, right_, "--out c.ply --json q.json");
   ASSERT_EQ(output.exit_code, 0) << output.text;
-  const auto cloud = ReadPly(folder_ / "c.ply");
+  const auto cloud = ReadPointCloud(folder_ / "c.ply");
   ASSERT_TRUE(cloud.ok()) << cloud.error().message;
   EXPECT_GE(cloud->size(), 550000U);  // of about 603,600 by an independent reconstruction
   std::ifstream stream(folder_ / "q.json");
