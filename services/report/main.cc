@@ -15,7 +15,8 @@ Result<std::shared_ptr<void>> Make(const ServiceContext& context) {
   const Station& station = context.station;
   ASSIGN_OR_RETURN(const ReportConfig config, ReportConfig::Load(station.file.Table("report")));
   auto program = std::make_shared<Program>();
-  ASSIGN_OR_RETURN(program->evaluator, ModelEvaluator::Load(station.model, station.features));
+  ASSIGN_OR_RETURN(program->evaluator,
+                   ModelEvaluator::Load(station.model, station.features, config.dimensions));
   const ReportStation shown{station.name, FORGESCAN_VERSION, station.file.hash(), station.results};
   ASSIGN_OR_RETURN(program->service,
                    ReportService::Create(context.hub, context.monitor, config, shown, *program->evaluator));

@@ -7,21 +7,24 @@
 
 namespace forgescan {
 
-ModelEvaluator::ModelEvaluator(ModelBundle model, Features features, TriangleIndex index)
-    : model_(std::move(model)), features_(std::move(features)), index_(std::move(index)) {}
+ModelEvaluator::ModelEvaluator(ModelBundle model, Features features, TriangleIndex index,
+                               const DimensionOptions& options)
+    : model_(std::move(model)), features_(std::move(features)), index_(std::move(index)), options_(options) {}
 
 Result<std::unique_ptr<ModelEvaluator>> ModelEvaluator::Load(const std::string& bundle_path,
-                                                             const std::string& features_path) {
+                                                             const std::string& features_path,
+                                                             const DimensionOptions& options) {
   ASSIGN_OR_RETURN(ModelBundle model, ReadBundle(bundle_path));
   ASSIGN_OR_RETURN(Features features, LoadFeatures(features_path));
-  return Make(std::move(model), std::move(features));
+  return Make(std::move(model), std::move(features), options);
 }
 
-Result<std::unique_ptr<ModelEvaluator>> ModelEvaluator::Make(ModelBundle model, Features features) {
+Result<std::unique_ptr<ModelEvaluator>> ModelEvaluator::Make(ModelBundle model, Features features,
+                                                             const DimensionOptions& options) {
   ASSIGN_OR_RETURN(Features bound, BindFeatures(std::move(features), model));
   ASSIGN_OR_RETURN(TriangleIndex index, TriangleIndex::Build(model.vertices, model.triangles));
   return std::unique_ptr<ModelEvaluator>(
-      new ModelEvaluator(std::move(model), std::move(bound), std::move(index)));
+      new ModelEvaluator(std::move(model), std::move(bound), std::move(index), options));
 }
 
 std::vector<MeasuredDimension> ModelEvaluator::Dimensions() const {
@@ -41,7 +44,7 @@ std::vector<MeasuredDimension> ModelEvaluator::Dimensions() const {
 
 Result<std::vector<MeasuredDimension>> ModelEvaluator::Evaluate(const PointCloud& cloud_in_model) const {
   ASSIGN_OR_RETURN(const std::vector<DimensionResult> results,
-                   EvaluateDimensions(cloud_in_model, model_, features_, DimensionOptions{}));
+                   EvaluateDimensions(cloud_in_model, model_, features_, options_));
   std::vector<MeasuredDimension> dimensions = Dimensions();
   if (results.size() != dimensions.size()) {
     return Fail(ErrorCode::kUntrusted, "{} of {} dimensions were evaluated", results.size(),

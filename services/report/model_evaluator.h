@@ -16,9 +16,11 @@ class ModelEvaluator final : public PartEvaluator {
  public:
   // Errors: as ReadBundle, LoadFeatures and BindFeatures.
   static Result<std::unique_ptr<ModelEvaluator>> Load(const std::string& bundle_path,
-                                                      const std::string& features_path);
+                                                      const std::string& features_path,
+                                                      const DimensionOptions& options);
   // Errors: as BindFeatures and TriangleIndex::Build.
-  static Result<std::unique_ptr<ModelEvaluator>> Make(ModelBundle model, Features features);
+  static Result<std::unique_ptr<ModelEvaluator>> Make(ModelBundle model, Features features,
+                                                      const DimensionOptions& options);
 
   std::vector<MeasuredDimension> Dimensions() const override;
   Result<std::vector<MeasuredDimension>> Evaluate(const PointCloud& cloud_in_model) const override;
@@ -29,11 +31,12 @@ class ModelEvaluator final : public PartEvaluator {
   static constexpr double kMaxDeviationMm = 20.0;
 
  private:
-  ModelEvaluator(ModelBundle model, Features features, TriangleIndex index);
+  ModelEvaluator(ModelBundle model, Features features, TriangleIndex index, const DimensionOptions& options);
 
   ModelBundle model_;
   Features features_;
   TriangleIndex index_;
+  DimensionOptions options_;
 };
 
 }  // namespace forgescan

@@ -2,6 +2,20 @@
 
 namespace forgescan {
 
+namespace {
+
+void ReadDimensions(ConfigTable table, DimensionOptions& options) {
+  int min_points = static_cast<int>(options.min_points);
+  table.Optional("min_points", min_points, 10, 1'000'000);
+  options.min_points = static_cast<std::size_t>(min_points);
+  table.Optional("min_arc_deg", options.min_arc_deg, 10.0, 360.0);
+  table.Optional("flag_removed_share", options.flag_removed_share, 0.0, 1.0);
+  table.Optional("max_form_share", options.fit.max_form_share, 0.001, 0.5);
+  table.Optional("max_form_sigma_mm", options.fit.max_form_sigma_mm, 0.001, 10.0);
+}
+
+}  // namespace
+
 Result<ReportConfig> ReportConfig::Load(ConfigTable table) {
   ReportConfig config;
   table.Optional("part_timeout_s", config.part_timeout_s, 1.0, 3600.0);
@@ -17,6 +31,7 @@ Result<ReportConfig> ReportConfig::Load(ConfigTable table) {
   budget.Optional("refraction_mm", config.uncertainty.refraction_mm, 0.0, 10.0);
   budget.Optional("temperature_k", config.uncertainty.temperature_k, 0.0, 200.0);
   budget.Optional("expansion_slope_per_k", config.uncertainty.expansion_slope_per_k, 0.0, 1e-3);
+  ReadDimensions(table.Table("dimensions"), config.dimensions);
   RETURN_IF_ERROR(table.Finish());
   RETURN_IF_ERROR(config.Check());
   return config;

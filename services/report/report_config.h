@@ -2,6 +2,7 @@
 #pragma once
 
 #include "services/common/config/config.h"
+#include "services/common/features/dimensions.h"
 #include "services/report/uncertainty.h"
 
 namespace forgescan {
@@ -16,8 +17,10 @@ struct ReportConfig {
   double deviation_scale_mm = 1.0;  // the colours of the picture end here
   int picture_width_px = 2000;
   UncertaintyBudget uncertainty;
+  DimensionOptions dimensions;
 
-  // Reads the table and the table `uncertainty` in it. Errors: as ConfigTable, then Check().
+  // Reads the table and the tables `uncertainty` and `dimensions` in it. Errors: as ConfigTable, then
+  // Check().
   static Result<ReportConfig> Load(ConfigTable table);
   Status Check() const;
 };

@@ -112,7 +112,7 @@ Status SimLine::MakePartServices(const Station& station) {
   std::error_code ignored;  // there may be none
   std::filesystem::remove_all(station.results, ignored);
   ASSIGN_OR_RETURN(const ReportConfig report, ReportConfig::Load(station.file.Table("report")));
-  ASSIGN_OR_RETURN(evaluator_, ModelEvaluator::Load(station.model, station.features));
+  ASSIGN_OR_RETURN(evaluator_, ModelEvaluator::Load(station.model, station.features, report.dimensions));
   ASSIGN_OR_RETURN(
       report_service_,
       ReportService::Create(At("report").hub, At("report").monitor, report,

@@ -10,8 +10,10 @@ namespace {
 constexpr double kMadToSigma = 1.4826;  // for normal residuals
 constexpr double kRoundingMm = 1e-6;    // keeps exact data from losing points to the last digit
 
-// Least height of an arc over its chord, in sigmas. The bias of the radius falls with the square of this
-// ratio; at 10 it is about one percent, below 3 the radius is noise.
+// Least height of an arc over its chord, in sigmas. With 2000 random points over 40 degrees the radius
+// scatters by 0.9 % at 10 without a bias, and by 2 % with a bias of 1 % at 3; towards 1 it is a third too
+// small. The form errors of a forged face do not average out as that noise does, so the limit stays well
+// clear of the edge.
 constexpr double kLeastSagittaSigmas = 10;
 constexpr double kDegreesPerRadian = 180 / std::numbers::pi;
 

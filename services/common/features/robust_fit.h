@@ -47,9 +47,9 @@ Status CheckForm(const FitQuality& quality, double size_mm, const RobustOptions&
                  const char* feature);
 
 // Errors: kDegenerate if the height of the piece of circle that is seen over its chord does not stand clear
-// of the scatter. Purpose: that height is all that tells the radius; noise of its order makes the radius too
-// small by an amount that more points do not reduce, and that no covariance tells. half_arc_rad: half the
-// angle seen from the centre.
+// of the scatter. Purpose: that height is all that tells the radius; noise of its order has a radius of its
+// own, wrong by an amount that more points do not reduce, and that no covariance tells. half_arc_rad: half
+// the angle seen from the centre.
 Status CheckSagitta(const FitQuality& quality, double radius_mm, double half_arc_rad, const char* feature);
 
 // Purpose: drop what lies beyond k sigma and refit, until none is left or max_rounds: every round judges all

@@ -34,7 +34,7 @@ std::unique_ptr<ModelEvaluator> Evaluator() {
   EXPECT_TRUE(model.ok()) << model.error().message;
   auto features = ParseFeatures(kFeatures, "features.toml");
   EXPECT_TRUE(features.ok()) << features.error().message;
-  auto evaluator = ModelEvaluator::Make(*model, *features);
+  auto evaluator = ModelEvaluator::Make(*model, *features, {});
   EXPECT_TRUE(evaluator.ok()) << evaluator.error().message;
   return std::move(*evaluator);
 }
