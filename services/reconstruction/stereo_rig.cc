@@ -87,6 +87,22 @@ Status CheckFitsFrame(const CameraIntrinsics& camera, ImageSize size, const char
   return CheckDistortion(camera, size, which);
 }
 
+// A rig has two lenses of one kind on sensors of one kind with square pixels.
+Status CheckFocalLengths(const StereoCalibration& calibration) {
+  constexpr double kMaxRatio = 1.15;
+  const Eigen::Matrix3d& left = calibration.left.camera_matrix;
+  const Eigen::Matrix3d& right = calibration.right.camera_matrix;
+  const auto [least, most] = std::minmax({left(0, 0), left(1, 1), right(0, 0), right(1, 1)});
+  if (!(most <= kMaxRatio * least)) {
+    return Fail(
+        ErrorCode::kInvalidArgument,
+        "the focal lengths of the two cameras (x, y) are between {:.1f} and {:.1f} px, a factor of at "
+        "most {} is allowed",
+        least, most, kMaxRatio);
+  }
+  return {};
+}
+
 }  // namespace
 
 Result<StereoRig> MakeStereoRig(const StereoCalibration& calibration, ImageSize image_size) {
@@ -100,6 +116,7 @@ Result<StereoRig> MakeStereoRig(const StereoCalibration& calibration, ImageSize 
   }
   RETURN_IF_ERROR(CheckFitsFrame(calibration.left, image_size, "left camera"));
   RETURN_IF_ERROR(CheckFitsFrame(calibration.right, image_size, "right camera"));
+  RETURN_IF_ERROR(CheckFocalLengths(calibration));
   const cv::Size size(image_size.width_px, image_size.height_px);
   cv::Mat translation, r1, r2, p1, p2, q;
   cv::eigen2cv(calibration.right_from_left.translation_mm, translation);

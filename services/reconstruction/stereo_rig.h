@@ -27,9 +27,10 @@ struct StereoRig {
 };
 
 // Errors: those of Check(calibration); kInvalidArgument when the image size is not the calibration's or
-// cannot be (principal point outside the middle half of the frame, field of view outside 2 to 120 degrees),
-// when a lens folds the image over or shifts its corners by more than 30 % of their radius, or when the
-// cameras stand above each other (rows would not be epipolar lines). Cost: about 0.2 s at 5 MP; do it once.
+// cannot be (principal point outside the middle half of the frame, field of view outside 2 to 120 degrees,
+// focal lengths that differ by more than 15 %), when a lens folds the image over or shifts its corners by
+// more than 30 % of their radius, or when the cameras stand above each other (rows would not be epipolar
+// lines). Cost: about 0.2 s at 5 MP; do it once.
 Result<StereoRig> MakeStereoRig(const StereoCalibration& calibration, ImageSize image_size);
 
 }  // namespace forgescan
