@@ -31,11 +31,15 @@ function(forgescan_library name)
   target_link_libraries(${name} PUBLIC forgescan_options ${ARG_DEPS} PRIVATE ${ARG_PRIVATE_DEPS})
 endfunction()
 
+# What a user runs, without the tests: cmake --build --preset release --target programs.
+add_custom_target(programs)
+
 # forgescan_program(NAME SOURCES... DEPS targets...): an executable in <build>/bin.
 function(forgescan_program name)
   cmake_parse_arguments(ARG "" "" "SOURCES;DEPS" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE forgescan_options ${ARG_DEPS})
+  add_dependencies(programs ${name})
 endfunction()
 
 # forgescan_test(NAME SOURCES... DEPS targets... [NETWORK]): one GoogleTest program = one ctest entry. Paths reach the test

@@ -67,6 +67,7 @@ class Progress {
 
   const std::vector<fsmsg::verdict_t>& verdicts() const { return verdicts_; }
   int sorted() const { return sorted_; }
+  double Seconds() const { return static_cast<double>(hub_.bus().NowUs() - start_us_) * 1e-6; }
 
  private:
   static const char* VerdictName(int verdict) {
@@ -170,7 +171,7 @@ Result<std::vector<fsmsg::verdict_t>> InspectParts(StationRunner& runner, Proces
       return Fail(ErrorCode::kUnavailable, "{}", ended);
     }
   }
-  fmt::print("\n{}\n", runner.Table(140, false));
+  fmt::print("\n{}\ninspection took {:.0f} s\n", runner.Table(140, false), progress.Seconds());
   return progress.verdicts();
 }
 
