@@ -77,8 +77,7 @@ Result<std::unique_ptr<LcmBus>> LcmBus::Open(const std::string& url) {
   if (lcm == nullptr) {
     return Fail(ErrorCode::kUnavailable,
                 "bus {}: cannot be opened; is there a multicast route? (ip route add 239.255.76.67/32 dev "
-                "lo, or run it under "
-                "tools/with-network)",
+                "lo, and 239.74.163.2/32 for CAN over UDP, or run it under tools/with-network)",
                 url);
   }
   return std::unique_ptr<LcmBus>(new LcmBus(lcm, port));

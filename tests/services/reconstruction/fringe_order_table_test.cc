@@ -8,6 +8,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "services/reconstruction/fringe_decoder.h"
+#include "tests/common/real_data.h"
 
 namespace forgescan {
 namespace {
@@ -68,10 +69,11 @@ TEST(FringeOrderTable, RefusesPeriodsThatAreAmbiguousInTheField) {
 
 // A rendered bust by others; the published unwrapped phase of the 64-period set at row 470, column 590.
 TEST(FringeDecoder, AgreesWithAPublishedPhase) {
-  const auto directory = std::filesystem::path(FORGESCAN_SOURCE_DIR) / "../shared/data/rendered-fringe";
-  if (!std::filesystem::exists(directory)) {
-    GTEST_SKIP() << "no ../shared/data/rendered-fringe beside the repository";
+  const auto found = RealData("rendered-fringe");
+  if (!found.has_value()) {
+    GTEST_SKIP() << "rendered-fringe" << kNoRealData;
   }
+  const std::filesystem::path& directory = *found;
   PatternSet pattern = Periods(1920, {30, 1920.0 / 58, 1920.0 / 53});
   for (auto& frequency : pattern.frequencies) {  // the phase runs -pi..pi inside each period
     for (double& shift_rad : frequency.shift_rad) {
