@@ -142,7 +142,6 @@ GigeCounters GigeDevice::counters() const {
   GigeCounters counters = impl_->sensor_.counters();
   const gige::TransmitterCounters sent = impl_->transmitter_.counters();
   counters.frames_sent = sent.frames;
-  counters.frames_late = sent.frames_late;
   counters.packets_sent = sent.packets;
   counters.packets_lost = sent.packets_lost;
   counters.packets_refused = sent.packets_refused;

@@ -77,6 +77,15 @@ std::uint32_t GvspFrame::data_packets() const {
   return (total_bytes + DataBytesPerPacket(*this) - 1) / DataBytesPerPacket(*this);
 }
 
+std::size_t GvspFrame::wire_bytes() const {
+  const std::uint32_t last = packets() - 1;
+  const std::size_t leader = MakePacket(*this, 0, PacketStatus::kSuccess).wire_bytes();
+  const std::size_t trailer = MakePacket(*this, last, PacketStatus::kSuccess).wire_bytes();
+  const std::size_t heads =
+      data_packets() * std::size_t{kGvspHeader_bytes + kIpUdpHeader_bytes + kEthernet_bytes};
+  return leader + heads + image->size() + chunks.size() + trailer;
+}
+
 std::vector<std::uint8_t> MakeChunks(const ChunkSelection& selection, const ChunkValues& values) {
   std::vector<std::uint8_t> chunks;
   if (!selection.active) {

@@ -41,6 +41,8 @@ struct GvspFrame {
 
   std::uint32_t data_packets() const;
   std::uint32_t packets() const { return data_packets() + 2; }
+  // Of all its packets.
+  std::size_t wire_bytes() const;
 };
 
 // Ids and times that follow the pixels; a chunk is its data, its id and its length.

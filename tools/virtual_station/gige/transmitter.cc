@@ -13,14 +13,17 @@ namespace {
 
 constexpr std::size_t kBatch_packets = 32;
 constexpr std::int64_t kBatch_ns = 500'000;  // packets due within this time go out together
-// A thread that the system woke late sends what is due at once and is back on the camera's schedule. Beyond
-// this, a burst would overrun a receiver that a real camera would not: then the frame simply starts late.
-constexpr std::int64_t kCatchUp_ns = 20'000'000;
+constexpr int kCatchUp = 2;                  // a late sender's speed, in multiples of the camera's
 constexpr std::size_t kMemory_frames = 4;
+constexpr std::size_t kBehind_frames = 64;  // what a machine that cannot keep up may owe
 constexpr std::size_t kHistory_frames = 8;
 
 iovec Piece(std::span<const std::uint8_t> bytes) {
   return {const_cast<std::uint8_t*>(bytes.data()), bytes.size()};  // sendmmsg does not write
+}
+
+std::int64_t FrameTimeNs(const GvspFrame& frame, double rate_mbit_s) {
+  return WireTimeNs(frame.wire_bytes(), rate_mbit_s) + frame.packets() * frame.packet_delay_ns;
 }
 
 }  // namespace
@@ -52,9 +55,14 @@ Transmitter::~Transmitter() {
 bool Transmitter::Submit(std::shared_ptr<const GvspFrame> frame) {
   {
     const std::lock_guard lock(mutex_);
-    if (waiting_.size() >= kMemory_frames) {
+    while (!leave_ns_.empty() && leave_ns_.front() <= frame->ready_ns) {
+      leave_ns_.pop_front();
+    }
+    if (leave_ns_.size() >= kMemory_frames || waiting_.size() >= kBehind_frames) {
       return false;
     }
+    const std::int64_t begin_ns = leave_ns_.empty() ? frame->ready_ns : leave_ns_.back();
+    leave_ns_.push_back(begin_ns + FrameTimeNs(*frame, options_.rate_mbit_s));
     waiting_.push_back(std::move(frame));
   }
   wake_.notify_one();
@@ -75,6 +83,7 @@ void Transmitter::Forget() {
   history_.clear();
   resends_.clear();
   active_.reset();
+  leave_ns_.clear();
 }
 
 void Transmitter::SetFaults(double packet_loss_chance, bool resend_unavailable) {
@@ -93,17 +102,19 @@ TransmitterCounters Transmitter::counters() const {
 void Transmitter::Run() {
   std::unique_lock lock(mutex_);
   while (!stop_) {
-    if (!resends_.empty()) {
-      ServeResend();
-    } else if (!active_ && !StartFrame()) {
+    if (resends_.empty() && !active_ && !StartFrame()) {
       wake_.wait(lock);
-    } else if (port_free_ns_ > MonoNowNs()) {
-      wake_.wait_until(lock, MonoTimePoint(port_free_ns_));
+    } else if (NextSendNs() > MonoNowNs()) {
+      wake_.wait_until(lock, MonoTimePoint(NextSendNs()));
+    } else if (!resends_.empty()) {
+      ServeResend();
     } else {
       SendSome();
     }
   }
 }
+
+std::int64_t Transmitter::NextSendNs() const { return std::max(port_free_ns_, host_free_ns_); }
 
 bool Transmitter::StartFrame() {
   if (waiting_.empty()) {
@@ -112,10 +123,7 @@ bool Transmitter::StartFrame() {
   active_ = std::move(waiting_.front());
   waiting_.pop_front();
   next_packet_ = 0;
-  const std::int64_t now_ns = MonoNowNs();
-  const bool late = active_->ready_ns < now_ns - kCatchUp_ns;
-  counters_.frames_late += late ? 1U : 0U;
-  port_free_ns_ = std::max(port_free_ns_, late ? now_ns : active_->ready_ns);
+  port_free_ns_ = std::max(port_free_ns_, active_->ready_ns);
   history_.push_back(active_);
   if (history_.size() > kHistory_frames) {
     history_.pop_front();
@@ -125,13 +133,14 @@ bool Transmitter::StartFrame() {
 
 void Transmitter::SendSome() {
   Batch batch;
+  const std::int64_t begin_ns = port_free_ns_;
   const std::int64_t until_ns = MonoNowNs() + kBatch_ns;
   const std::uint32_t packets = active_->packets();
   for (std::size_t i = 0; i < kBatch_packets && next_packet_ < packets && port_free_ns_ <= until_ns; ++i) {
     Add(batch, *active_, MakePacket(*active_, next_packet_, PacketStatus::kSuccess));
     ++next_packet_;
   }
-  Send(batch);
+  SendPaced(batch, begin_ns);
   if (next_packet_ == packets) {
     ++counters_.frames;
     active_.reset();
@@ -152,7 +161,10 @@ void Transmitter::ServeResend() {
   const std::uint32_t end =
       std::min(request.last_packet + 1, available ? frame.packets() : request.last_packet + 1);
   Batch batch;
-  port_free_ns_ = std::max(port_free_ns_, MonoNowNs());
+  if (!active_ && waiting_.empty()) {  // else the resend takes its turn in a schedule that may be behind
+    port_free_ns_ = std::max(port_free_ns_, MonoNowNs());
+  }
+  const std::int64_t begin_ns = port_free_ns_;
   for (std::size_t i = 0; i < kBatch_packets && request.first_packet < end; ++i, ++request.first_packet) {
     if (available) {
       Add(batch, frame, MakePacket(frame, request.first_packet, PacketStatus::kResent));
@@ -161,7 +173,7 @@ void Transmitter::ServeResend() {
     }
   }
   ++(available ? counters_.packets_resent : counters_.resends_unavailable);
-  Send(batch);
+  SendPaced(batch, begin_ns);
   if (request.first_packet >= end) {
     resends_.pop_front();
   }
@@ -190,6 +202,12 @@ void Transmitter::Add(Batch& batch, const GvspFrame& frame, const GvspPacket& pa
   message.msg_iov = entry.pieces.data();
   message.msg_iovlen = entry.pieces.size();
   ++batch.size;
+}
+
+// `begin_ns`: when the batch began to leave by the camera's schedule.
+void Transmitter::SendPaced(Batch& batch, std::int64_t begin_ns) {
+  Send(batch);
+  host_free_ns_ = MonoNowNs() + (port_free_ns_ - begin_ns) / kCatchUp;
 }
 
 void Transmitter::Send(Batch& batch) {

@@ -1,4 +1,9 @@
 // Transmitter: sends frames as GVSP packets at the speed of the camera's link, and again when asked.
+//
+// Two clocks run in it. The camera's: when each packet leaves by the camera's own schedule; the memory and
+// the shared link are judged by it, so that a late image or a busy machine loses nothing that a real camera
+// would not. And this machine's: when the packet is really given to the system. A sender that is late catches
+// up at twice the camera's speed.
 #pragma once
 
 #include <atomic>
@@ -25,9 +30,7 @@ struct TransmitterOptions {
 
 struct TransmitterCounters {
   std::uint64_t frames = 0;
-  std::uint64_t frames_late =
-      0;                      // began more than 20 ms after the end of exposure, off the camera's schedule
-  std::uint64_t packets = 0;  // given to the system
+  std::uint64_t packets = 0;          // given to the system
   std::uint64_t packets_lost = 0;     // by the fault knob
   std::uint64_t packets_refused = 0;  // by the shared link
   std::uint64_t packets_failed = 0;   // by the system
@@ -35,14 +38,15 @@ struct TransmitterCounters {
   std::uint64_t resends_unavailable = 0;
 };
 
-// Thread-safe. Holds 4 frames that wait and the last 8 that went out.
+// Thread-safe. Holds 4 frames, the one being sent included, and the last 8 that went out.
 class Transmitter {
  public:
   // `fd`: a UDP socket that outlives the object.
   Transmitter(int fd, TransmitterOptions options);
   ~Transmitter();
 
-  // false: the camera's memory is full, the frame is not taken.
+  // false: the camera's memory was full when the frame was exposed, or this machine is seconds behind: not
+  // taken.
   bool Submit(std::shared_ptr<const GvspFrame> frame);
   void RequestResend(const ResendRequest& request);
   // Drops what waits, what is being sent and what was sent.
@@ -55,6 +59,8 @@ class Transmitter {
 
   void Run();
   bool StartFrame();
+  std::int64_t NextSendNs() const;
+  void SendPaced(Batch& batch, std::int64_t begin_ns);
   void SendSome();
   void ServeResend();
   void Add(Batch& batch, const GvspFrame& frame, const GvspPacket& packet);
@@ -70,7 +76,9 @@ class Transmitter {
   std::deque<ResendRequest> resends_;
   std::shared_ptr<const GvspFrame> active_;
   std::uint32_t next_packet_ = 0;
-  std::int64_t port_free_ns_ = 0;  // when the camera's port can take the next packet
+  std::int64_t port_free_ns_ = 0;      // when the camera's port can take the next packet, by its schedule
+  std::int64_t host_free_ns_ = 0;      // when this machine may send the next packet
+  std::deque<std::int64_t> leave_ns_;  // when each frame in the camera's memory will be gone, by the schedule
   double packet_loss_chance_ = 0;
   bool resend_unavailable_ = false;
   std::mt19937_64 random_;

@@ -1,5 +1,4 @@
-// The production camera driver against the virtual camera over the loopback interface: losses, repair,
-// sharing a link.
+// The production camera driver against the virtual camera over the loopback interface: losses, repair.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -9,77 +8,12 @@
 
 #include "drivers/camera/camera_aravis.h"
 #include "tests/drivers/camera/camera_rig.h"
+#include "tests/tools/virtual_station/gige/gige_channel.h"
 #include "tools/virtual_station/gige/gige_device.h"
 #include "tools/virtual_station/gige/mono_time.h"
 
 namespace forgescan {
 namespace {
-
-constexpr int kPatience_ms = 30'000;
-constexpr std::int64_t kMs_ns = 1'000'000;
-
-std::shared_ptr<const std::vector<std::uint8_t>> SharedRigImage(std::uint64_t tag) {
-  return std::make_shared<const std::vector<std::uint8_t>>(RigImage(tag));
-}
-
-// One virtual camera and its driver. What it received stays in `frames`.
-struct Channel {
-  std::unique_ptr<GigeDevice> device;
-  std::unique_ptr<CameraAravis> camera;
-  std::vector<CameraFrame> frames;
-
-  std::size_t complete() const {
-    return static_cast<std::size_t>(
-        std::count_if(frames.begin(), frames.end(), [](const CameraFrame& frame) { return frame.complete; }));
-  }
-};
-
-GigeDeviceConfig SmallDevice(const std::string& address) {
-  GigeDeviceConfig config;
-  config.address = address;
-  config.serial = address;
-  config.width_px = kRigWidth_px;
-  config.height_px = kRigHeight_px;
-  config.image = SharedRigImage;
-  return config;
-}
-
-CameraAravisOptions OptionsFor(const GigeDeviceConfig& config) {
-  CameraAravisOptions options;
-  options.address = config.address;
-  options.width_px = config.width_px;
-  options.height_px = config.height_px;
-  options.exposure_us = kRigExposure_us;
-  options.frame_retention_ms = 200;
-  options.teardown_wait_ms = 10'000;
-  options.realtime_thread = false;
-  options.queue_capacity_frames = 200;
-  return options;
-}
-
-std::unique_ptr<Channel> Open(const GigeDeviceConfig& config, const CameraAravisOptions& options) {
-  auto channel = std::make_unique<Channel>();
-  auto device = GigeDevice::Create(config);
-  EXPECT_TRUE(device.ok()) << device.error().message;
-  channel->device = std::move(device).value();
-  channel->camera = std::make_unique<CameraAravis>(options);
-  channel->camera->SetHandler(
-      [self = channel.get()](CameraFrame frame) { self->frames.push_back(std::move(frame)); });
-  const Status started = channel->camera->Start();
-  EXPECT_TRUE(started.ok()) << started.error().message;
-  return channel;
-}
-
-void Fire(Channel& channel, std::int64_t first_ns, std::int64_t period_ns, int count) {
-  for (int i = 0; i < count; ++i) {
-    channel.device->Edge(first_ns + i * period_ns, static_cast<std::uint64_t>(i));
-  }
-}
-
-bool Receive(Channel& channel, std::size_t count) {
-  return DispatchUntil(
-      *channel.camera, [&] { return channel.frames.size() >= count; }, kPatience_ms);
-}
 
 TEST(GigeLine, OnePercentOfPacketsLostIsRepaired) {
   const GigeDeviceConfig config = SmallDevice("127.0.0.1");
@@ -136,97 +70,16 @@ TEST(GigeLine, TwoCamerasInOneProcessKeepTheirImagesApart) {
   }
 }
 
-// The shared port holds 64 KiB. A frame takes 2.7 ms of it; two at once need twice its rate and overrun it by
-// 328 KB.
-std::size_t CompleteOnSharedLink(std::int64_t offset_ns) {
-  const auto link = std::make_shared<Link>(LinkOptions{1000, 64 * 1024});
-  std::vector<std::unique_ptr<Channel>> channels;
-  for (const char* address : {"127.0.0.1", "127.0.0.2"}) {
-    GigeDeviceConfig config = SmallDevice(address);
-    config.link = link;
-    config.image = [image = SharedRigImage(0)](std::uint64_t) {
-      return image;
-    };  // no rendering that could be late
-    config.offers_resend = false;
-    channels.push_back(Open(config, OptionsFor(config)));
-  }
-  // The first frame is not counted: Aravis enlarges its socket's buffer only when the first packet is there,
-  // and without resends a busy machine may lose packets until then.
-  for (const auto& channel : channels) {
-    Fire(*channel, MonoNowNs() + kMs_ns, 0, 1);
-    EXPECT_TRUE(Receive(*channel, 1));
-    channel->frames.clear();
-  }
-  const std::int64_t start_ns = MonoNowNs() + kMs_ns;
-  Fire(*channels[0], start_ns, 20 * kMs_ns, 15);
-  Fire(*channels[1], start_ns + offset_ns, 20 * kMs_ns, 15);
-  std::size_t complete = 0;
-  for (const auto& channel : channels) {
-    // Leader and trailer are small and pass, so that every frame is reported, whole or not.
-    EXPECT_TRUE(Receive(*channel, 15)) << channel->frames.size();
-    complete += channel->complete();
-  }
-  return complete;
-}
-
-TEST(GigeLine, CamerasThatTakeTurnsOnOneLinkLoseNothing) {
-  EXPECT_EQ(CompleteOnSharedLink(10 * kMs_ns), 30U);
-}
-
-TEST(GigeLine, CamerasThatFireTogetherOnOneLinkLoseFrames) {
-  // The paper's reason for time-division multiplexing. At most one of the two frames of a pair can get
-  // through.
-  EXPECT_LE(CompleteOnSharedLink(0), 15U);
-}
-
-std::shared_ptr<const std::vector<std::uint8_t>> FullSizeImage() {
-  const auto image = std::make_shared<std::vector<std::uint8_t>>(std::size_t{2448} * 2048);
-  for (std::size_t i = 0; i < image->size(); ++i) {
-    (*image)[i] = static_cast<std::uint8_t>((i * 2654435761U) >> 13);
-  }
-  return image;
-}
-
 TEST(GigeLine, FullSizeFramesArrive) {
-  const auto image = FullSizeImage();
-  GigeDeviceConfig config = SmallDevice("127.0.0.1");
-  config.width_px = 2448;
-  config.height_px = 2048;
+  GigeDeviceConfig config = FullSizeDevice("127.0.0.1");
   config.rate_mbit_s = 2500;  // 16 ms a frame
-  config.image = [image](std::uint64_t) { return image; };
   const auto channel = Open(config, OptionsFor(config));
   Fire(*channel, MonoNowNs() + kMs_ns, 40 * kMs_ns, 6);
   ASSERT_TRUE(Receive(*channel, 6));
+  const auto image = config.image(0);
   for (const CameraFrame& frame : channel->frames) {
     EXPECT_TRUE(frame.complete);
     EXPECT_TRUE(frame.pixels == *image);
-  }
-}
-
-// The paper's budget: two 5 MP cameras on one 1 Gbit/s link, 12 patterns in a second. A frame takes 40.6 ms
-// of the link.
-TEST(GigeLine, TwelvePatternsInASecondFromTwoFullSizeCamerasOnOneLink) {
-#if defined(__SANITIZE_THREAD__)
-  GTEST_SKIP() << "this is about real time, which a program under ThreadSanitizer cannot keep";
-#endif
-  const auto image = FullSizeImage();
-  const auto link = std::make_shared<Link>(LinkOptions{});
-  std::vector<std::unique_ptr<Channel>> channels;
-  for (const char* address : {"127.0.0.1", "127.0.0.2"}) {
-    GigeDeviceConfig config = SmallDevice(address);
-    config.width_px = 2448;
-    config.height_px = 2048;
-    config.link = link;
-    config.image = [image](std::uint64_t) { return image; };
-    channels.push_back(Open(config, OptionsFor(config)));
-  }
-  const std::int64_t start_ns = MonoNowNs() + kMs_ns;
-  Fire(*channels[0], start_ns, 82 * kMs_ns, 12);
-  Fire(*channels[1], start_ns + 41 * kMs_ns, 82 * kMs_ns, 12);
-  for (const auto& channel : channels) {
-    ASSERT_TRUE(Receive(*channel, 12));
-    EXPECT_EQ(channel->complete(), 12U);
-    EXPECT_TRUE(channel->frames.back().pixels == *image);
   }
 }
 
