@@ -24,6 +24,12 @@ if(FORGESCAN_SANITIZE)
   target_link_options(forgescan_options INTERFACE -fsanitize=${FORGESCAN_SANITIZE})
 endif()
 
+# What tests and the programs they start run with.
+if(FORGESCAN_SANITIZE)
+  set(FORGESCAN_TEST_ENVIRONMENT "LSAN_OPTIONS=suppressions=${CMAKE_SOURCE_DIR}/tests/lsan.supp:print_suppressions=0"
+      "TSAN_OPTIONS=suppressions=${CMAKE_SOURCE_DIR}/tests/tsan.supp")
+endif()
+
 # forgescan_library(NAME SOURCES... DEPS targets...): a library; includes are written from the repository's root.
 function(forgescan_library name)
   cmake_parse_arguments(ARG "" "" "SOURCES;DEPS;PRIVATE_DEPS" ${ARGN})
@@ -60,11 +66,11 @@ function(forgescan_test name)
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 120)
   endif()
-  set_tests_properties(${name} PROPERTIES TIMEOUT ${ARG_TIMEOUT})
   if(FORGESCAN_SANITIZE)
-    set_tests_properties(${name} PROPERTIES ENVIRONMENT
-                         "LSAN_OPTIONS=suppressions=${CMAKE_SOURCE_DIR}/tests/lsan.supp:print_suppressions=0")
+    math(EXPR ARG_TIMEOUT "${ARG_TIMEOUT} * 5")
   endif()
+  set_tests_properties(${name} PROPERTIES TIMEOUT ${ARG_TIMEOUT})
+  set_tests_properties(${name} PROPERTIES ENVIRONMENT "${FORGESCAN_TEST_ENVIRONMENT}")
 endfunction()
 
 # uses_regex(TARGET): GCC 12 warns of std::regex's own members when sanitizers are on (a false alarm); only there, and only
