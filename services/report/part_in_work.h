@@ -13,6 +13,7 @@
 #include "fsmsg/verdict_t.hpp"
 #include "services/common/geometry/point_cloud.h"
 #include "services/report/part_report.h"
+#include "services/report/service_tally.h"
 
 namespace forgescan {
 
@@ -26,6 +27,7 @@ struct PartInWork {
   std::optional<PointCloud> cloud_in_model;
   std::string cloud_error;  // why the cloud cannot be used; empty = nothing wrong so far
   std::map<std::string, std::int64_t> duration_us;  // by step, summed over the views
+  ServiceSums sums_at_opening;
 
   bool converged() const;
   // Everything a verdict needs, and the fusion's word on the views, is here.

@@ -51,7 +51,8 @@ ReportService::ReportService(StreamHub& hub, ServiceMonitor& monitor, Parts part
       config_(parts.config),
       station_(std::move(parts.station)),
       writer_(std::move(parts.writer)),
-      evaluator_(evaluator) {
+      evaluator_(evaluator),
+      pages_(hub.bus(), monitor, station_.name, {config_, writer_, evaluator_, tally_}) {
   Subscribe();
   SubscribeDurations();
   hub_.Advertise(kVerdict);
@@ -59,9 +60,6 @@ ReportService::ReportService(StreamHub& hub, ServiceMonitor& monitor, Parts part
 }
 
 ReportService::~ReportService() {
-  while (!judged_.empty()) {
-    WritePage(judged_.begin()->first);
-  }
   for (const auto& [part, open] : open_) {
     hub_.bus().Cancel(open.timeout);
   }
@@ -100,8 +98,9 @@ void ReportService::SubscribeDurations() {
   hub_.Subscribe<fsmsg::processing_time_t>(kReconstructionTime, note);
   hub_.Subscribe<fsmsg::processing_time_t>(kFusionTime, note);
   hub_.Subscribe<fsmsg::processing_time_t>(kRegistrationTime, note);
-  SubscribeState<fsmsg::service_state_t>(hub_.bus(), kServiceState,
-                                         [this](const fsmsg::service_state_t& state) { tally_.Note(state); });
+  SubscribeState<fsmsg::service_state_t>(
+      hub_.bus(), kServiceState,
+      [this](const fsmsg::service_state_t& state) { tally_.Note(state, hub_.bus().NowUs()); });
 }
 
 void ReportService::OnArrived(const fsmsg::part_arrived_t& message) {
@@ -133,9 +132,9 @@ void ReportService::OnSlice(const fsmsg::cloud_slice_t& message) {
 }
 
 void ReportService::OnDuration(const fsmsg::processing_time_t& message) {
-  if (const auto judged = judged_.find(message.part); judged != judged_.end()) {
-    judged->second.work.duration_us[message.step] += message.duration_us;
-  } else if (PartInWork* work = Find(message.part, message.utime); work != nullptr) {
+  PartInWork* judged = pages_.Find(message.part);
+  PartInWork* work = judged != nullptr ? judged : Find(message.part, message.utime);
+  if (work != nullptr) {
     work->duration_us[message.step] += message.duration_us;
   }
 }
@@ -169,6 +168,7 @@ PartInWork* ReportService::Find(int part, std::int64_t utime) {
   Open& open = open_[part];
   open.work.part = part;
   open.work.first_utime = utime;
+  open.work.sums_at_opening = tally_.Sums();
   open.timeout = hub_.bus().At(hub_.bus().NowUs() + Us(config_.part_timeout_s), [this, part] {
     monitor_.Count("parts_timed_out");
     Finish(part);
@@ -200,8 +200,6 @@ PartReport ReportService::Judge(const PartInWork& work) const {
   report.station = station_.name;
   report.software_version = station_.software_version;
   report.config_hash = station_.config_hash;
-  report.counters.messages_missing = tally_.messages_missing();
-  report.counters.restarts = tally_.restarts();
   const std::string obstacle = work.Obstacle();
   const auto measured = obstacle.empty() ? evaluator_.Evaluate(*work.cloud_in_model)
                                          : Result<std::vector<MeasuredDimension>>(evaluator_.Dimensions());
@@ -217,11 +215,8 @@ PartReport ReportService::Judge(const PartInWork& work) const {
 }
 
 void ReportService::Finish(int part) {
-  if (judged_.contains(part)) {
-    WritePage(part);  // an earlier part with this number
-  }
   const std::int64_t started_us = hub_.bus().NowUs();
-  Judged judged;
+  JudgedPart judged;
   judged.work = std::move(open_.at(part).work);
   hub_.bus().Cancel(open_.at(part).timeout);
   open_.erase(part);
@@ -240,9 +235,7 @@ void ReportService::Finish(int part) {
   }
   judged.folder_name = ReportFolderName(part, utime);
   Publish(report, utime);
-  judged.page =
-      hub_.bus().At(report.verdict_utime + Us(config_.page_delay_s), [this, part] { WritePage(part); });
-  judged_[part] = std::move(judged);
+  pages_.Add(std::move(judged));
   TellState();
 }
 
@@ -253,29 +246,6 @@ void ReportService::Publish(const PartReport& report, std::int64_t utime) {
   Note(hub_.Publish(kVerdict, VerdictMessage(report, utime, folder_name)));
   Note(writer_.Remember(report, utime));
   monitor_.Count(CounterName(report.verdict.verdict));
-}
-
-void ReportService::WritePage(int part) {
-  Judged judged = std::move(judged_.extract(part).mapped());
-  hub_.bus().Cancel(judged.page);
-  PartReport& report = judged.report;
-  report.timing_s = WithSteps(report.timing_s, judged.work);
-  if (Result<std::vector<ReportedTrend>> trends = writer_.Trends(report); trends.ok()) {
-    report.trends = std::move(*trends);
-  } else {
-    Note(trends.error());
-  }
-  if (judged.work.converged() && judged.work.cloud_in_model.has_value()) {
-    Result<std::vector<std::uint8_t>> picture = PictureOf(*judged.work.cloud_in_model, evaluator_, config_);
-    if (picture.ok()) {
-      report.deviation_picture = std::move(*picture);
-    } else {
-      Note(picture.error());
-    }
-  }
-  Note(writer_.WriteJson(report, judged.folder_name));
-  Note(writer_.WritePage(report, judged.folder_name));
-  Note(writer_.WriteIndex(station_.name));
 }
 
 void ReportService::TellState() {

@@ -18,6 +18,7 @@
 #include "services/report/part_evaluator.h"
 #include "services/report/part_in_work.h"
 #include "services/report/report_config.h"
+#include "services/report/report_pages.h"
 #include "services/report/report_writer.h"
 #include "services/report/service_tally.h"
 
@@ -49,14 +50,6 @@ class ReportService {
     PartInWork work;
     Bus::TimerId timeout = 0;
   };
-  // A part that has its verdict, but not its page.
-  struct Judged {
-    PartInWork work;
-    PartReport report;
-    std::string folder_name;
-    Bus::TimerId page = 0;
-  };
-
   // What the service works with; made by Create().
   struct Parts {
     ReportConfig config;
@@ -81,7 +74,6 @@ class ReportService {
   void FinishAfterLoss();
   PartReport Judge(const PartInWork& work) const;
   void Publish(const PartReport& report, std::int64_t utime);
-  void WritePage(int part);
   void TellState();
   void Note(const Status& status);
 
@@ -92,9 +84,9 @@ class ReportService {
   ReportWriter writer_;
   const PartEvaluator& evaluator_;
   ServiceTally tally_;
+  ReportPages pages_;  // after what it writes with
   CloudAssembler assembler_;
-  std::map<int, Open> open_;      // by part
-  std::map<int, Judged> judged_;  // by part
+  std::map<int, Open> open_;  // by part
   std::deque<std::pair<int, std::int64_t>>
       finished_;  // the last parts with a verdict and their event time, oldest first
   std::set<Bus::TimerId> loss_timers_;
