@@ -63,9 +63,7 @@ ReportService::~ReportService() {
   for (const auto& [part, open] : open_) {
     hub_.bus().Cancel(open.timeout);
   }
-  for (const Bus::TimerId timer : loss_timers_) {
-    hub_.bus().Cancel(timer);
-  }
+  hub_.bus().Cancel(loss_timer_);
 }
 
 void ReportService::Subscribe() {
@@ -84,13 +82,14 @@ void ReportService::Subscribe() {
   hub_.Subscribe<fsmsg::registration_t>(kRegistration, [this](const auto& message) {
     if (PartInWork* work = Find(message.part, message.utime); work != nullptr) {
       work->registration = message;
+      work->registration_us = hub_.bus().NowUs();
       FinishIfComplete(message.part);
     }
   });
   hub_.Subscribe<fsmsg::cloud_slice_t>(kRegisteredCloud, [this](const auto& message) { OnSlice(message); });
   hub_.Subscribe<fsmsg::part_sorted_t>(kPartSorted, [this](const auto& message) { OnSorted(message); });
-  hub_.OnLost(kRegisteredCloud, [this](std::int64_t, std::int64_t) { OnLoss(); });
-  hub_.OnLost(kFusionResult, [this](std::int64_t, std::int64_t) { OnLoss(); });
+  hub_.OnLost(kRegisteredCloud, [this](std::int64_t, std::int64_t) { OnLoss(&PartInWork::cloud_hole); });
+  hub_.OnLost(kFusionResult, [this](std::int64_t, std::int64_t) { OnLoss(&PartInWork::fusion_hole); });
 }
 
 void ReportService::SubscribeDurations() {
@@ -147,14 +146,18 @@ void ReportService::OnSorted(const fsmsg::part_sorted_t& message) {
   }
 }
 
-void ReportService::OnLoss() {
+void ReportService::OnLoss(bool PartInWork::*hole) {
   monitor_.Count("holes");
-  const auto timer = std::make_shared<Bus::TimerId>();
-  *timer = hub_.bus().At(hub_.bus().NowUs() + Us(config_.loss_settle_s), [this, timer] {
-    loss_timers_.erase(*timer);
-    FinishAfterLoss();
-  });
-  loss_timers_.insert(*timer);
+  for (auto& [part, open] : open_) {
+    open.work.*hole = true;
+  }
+  CheckLossesLater();
+}
+
+void ReportService::CheckLossesLater() {
+  hub_.bus().Cancel(loss_timer_);
+  loss_timer_ =
+      hub_.bus().At(hub_.bus().NowUs() + Us(config_.loss_settle_s), [this] { FinishWhatWaitsInVain(); });
 }
 
 PartInWork* ReportService::Find(int part, std::int64_t utime) {
@@ -183,15 +186,31 @@ void ReportService::FinishIfComplete(int part) {
   }
 }
 
-void ReportService::FinishAfterLoss() {
-  std::vector<int> waiting;
+// Cloud and fusion's result are sent before the registration; a while after it they have been announced at
+// least.
+bool ReportService::WaitsInVain(const PartInWork& work) const {
+  if (!work.registration.has_value() ||
+      hub_.bus().NowUs() < work.registration_us + Us(config_.loss_settle_s)) {
+    return false;
+  }
+  const bool fusion_lost = work.fusion_hole && !hub_.Waiting(kFusionResult);
+  const bool cloud_lost = work.cloud_hole && !hub_.Waiting(kRegisteredCloud);
+  return (work.fusion.has_value() || fusion_lost) && (work.CloudSettled() || cloud_lost);
+}
+
+void ReportService::FinishWhatWaitsInVain() {
+  std::vector<int> in_vain;
+  bool others = false;
   for (const auto& [part, open] : open_) {
-    if (open.work.registration.has_value()) {
-      waiting.push_back(part);
+    if (WaitsInVain(open.work)) {
+      in_vain.push_back(part);
+    } else {
+      others = others || open.work.cloud_hole || open.work.fusion_hole;
     }
   }
-  for (const int part : waiting) {
-    Finish(part);
+  std::for_each(in_vain.begin(), in_vain.end(), [this](int part) { Finish(part); });
+  if (others) {
+    CheckLossesLater();
   }
 }
 

@@ -5,7 +5,6 @@
 #include <deque>
 #include <map>
 #include <memory>
-#include <set>
 #include <string>
 #include <utility>
 
@@ -64,14 +63,17 @@ class ReportService {
   void OnSlice(const fsmsg::cloud_slice_t& message);
   void OnDuration(const fsmsg::processing_time_t& message);
   void OnSorted(const fsmsg::part_sorted_t& message);
-  void OnLoss();
+  // Notes for every part in work that a message of one stream was given up, which may have been its own.
+  void OnLoss(bool PartInWork::*hole);
+  void CheckLossesLater();
 
   // The part in work, opened if it is new; nothing if it has its verdict already.
   PartInWork* Find(int part, std::int64_t utime);
   void FinishIfComplete(int part);
   void Finish(int part);
-  // Parts whose registration is known, but whose other messages will not come any more.
-  void FinishAfterLoss();
+  // What the part lacks was given up: its stream has a hole, and nothing is under way on it any more.
+  bool WaitsInVain(const PartInWork& work) const;
+  void FinishWhatWaitsInVain();
   PartReport Judge(const PartInWork& work) const;
   void Publish(const PartReport& report, std::int64_t utime);
   void TellState();
@@ -89,7 +91,7 @@ class ReportService {
   std::map<int, Open> open_;  // by part
   std::deque<std::pair<int, std::int64_t>>
       finished_;  // the last parts with a verdict and their event time, oldest first
-  std::set<Bus::TimerId> loss_timers_;
+  Bus::TimerId loss_timer_ = 0;
 };
 
 }  // namespace forgescan

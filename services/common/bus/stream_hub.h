@@ -50,6 +50,12 @@ class StreamHub {
   void OnLost(const Channel<Message>& channel, StreamReceiver::LostHandler handler) {
     Receiver(channel.name).SetLostHandler(std::move(handler));
   }
+  // A message that the sender has announced is still to come, or to be given up. False for a channel never subscribed.
+  template <typename Message>
+  bool Waiting(const Channel<Message>& channel) const {
+    const auto found = receivers_.find(channel.name);
+    return found != receivers_.end() && found->second->waiting();
+  }
 
  private:
   StreamReceiver& Receiver(const std::string& channel);
