@@ -3,7 +3,7 @@
 
 #include "fsmsg/view_ready_t.hpp"
 #include "services/common/bus/cloud_stream.h"
-#include "services/common/service/aged_map.h"
+#include "services/common/aged_map.h"
 #include "services/common/service/service_monitor.h"
 #include "services/fusion/fuse.h"
 #include "services/fusion/fusion_config.h"

@@ -7,7 +7,7 @@
 #include "fsmsg/fusion_result_t.hpp"
 #include "fsmsg/registration_t.hpp"
 #include "services/common/bus/cloud_stream.h"
-#include "services/common/service/aged_map.h"
+#include "services/common/aged_map.h"
 #include "services/common/service/service_monitor.h"
 #include "services/registration/registration_config.h"
 

@@ -76,38 +76,43 @@ Result<std::vector<fsmsg::cloud_slice_t>> SliceCloud(const PointCloud& cloud, st
   return slices;
 }
 
-Result<std::optional<PointCloud>> CloudAssembler::Add(const fsmsg::cloud_slice_t& slice) {
-  const std::pair key{slice.part, slice.view};
-  Open& open = open_[key];
-  if (IsConsistent(slice) && open.have.empty()) {
+CloudAssembler::Open& CloudAssembler::OpenFor(const fsmsg::cloud_slice_t& slice) {
+  const Key key{slice.part, slice.view, slice.utime};
+  if (open_.Find(key) == nullptr) {
+    Open open;
     Resize(open.cloud, static_cast<std::size_t>(slice.points_total));
     open.have.assign(static_cast<std::size_t>(slice.slice_count), false);
     open.missing = open.have.size();
+    open_.Insert(key, std::move(open));
   }
-  if (!IsConsistent(slice) || open.have.size() != static_cast<std::size_t>(slice.slice_count) ||
-      open.cloud.size() != static_cast<std::size_t>(slice.points_total)) {
-    open_.erase(key);
+  return *open_.Find(key);
+}
+
+Result<std::optional<PointCloud>> CloudAssembler::Add(const fsmsg::cloud_slice_t& slice) {
+  const Key key{slice.part, slice.view, slice.utime};
+  Open* open = IsConsistent(slice) ? &OpenFor(slice) : nullptr;
+  if (open == nullptr || open->have.size() != static_cast<std::size_t>(slice.slice_count) ||
+      open->cloud.size() != static_cast<std::size_t>(slice.points_total)) {
+    open_.Take(key);
     return Fail(ErrorCode::kFormat, "part {} view {}: slice {} of {} contradicts its cloud", slice.part, slice.view,
                 slice.slice, slice.slice_count);
   }
   const auto index = static_cast<std::size_t>(slice.slice);
-  if (!open.have[index]) {
-    open.have[index] = true;
-    --open.missing;
+  if (!open->have[index]) {
+    open->have[index] = true;
+    --open->missing;
     for (std::size_t i = 0; i < static_cast<std::size_t>(slice.points); ++i) {
-      Unpack(slice.data.data() + i * kPointBytes, static_cast<std::size_t>(slice.first_point) + i, open.cloud);
+      Unpack(slice.data.data() + i * kPointBytes, static_cast<std::size_t>(slice.first_point) + i, open->cloud);
     }
   }
-  if (open.missing > 0) {
+  if (open->missing > 0) {
     return std::optional<PointCloud>();
   }
-  std::optional<PointCloud> cloud = std::move(open.cloud);
-  open_.erase(key);
-  return cloud;
+  return std::optional<PointCloud>(std::move(open_.Take(key)->cloud));
 }
 
 void CloudAssembler::Forget(int part) {
-  std::erase_if(open_, [part](const auto& open) { return open.first.first == part; });
+  open_.EraseIf([part](const Key& key) { return std::get<0>(key) == part; });
 }
 
 }  // namespace forgescan
