@@ -99,7 +99,7 @@ void FusionService::OnCloudSlice(const fsmsg::cloud_slice_t& slice) {
   if (!cloud.ok()) {
     monitor_.ReportError(cloud.error());
   } else if (cloud->has_value()) {
-    part->OnCloud(slice.view, std::move(**cloud));
+    part->OnCloud(slice.view, slice.utime, std::move(**cloud));
     FinishIfSettled(slice.part);
   }
 }

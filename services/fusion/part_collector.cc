@@ -23,7 +23,8 @@ std::optional<std::string> PartCollector::VoidReason(const View& view) const {
   if (view.temperature.has_value() && view.temperature->valid != 1) {
     return "the pyrometer gave no part temperature";
   }
-  if (view.result.has_value() && view.cloud.has_value() && view.temperature.has_value()) {
+  if (view.result.has_value() && view.cloud.has_value() && view.cloud_utime == view.result->utime &&
+      view.temperature.has_value()) {
     const bool whole = static_cast<std::size_t>(view.result->points) == view.cloud->size();
     return whole ? std::string() : "the cloud is not the one the reconstruction announced";
   }

@@ -25,7 +25,11 @@ class PartCollector {
  public:
   void OnArrived(const fsmsg::part_arrived_t& arrived) { arrived_ = arrived; }
   void OnViewResult(const fsmsg::view_result_t& result);
-  void OnCloud(int view, PointCloud cloud) { views_[view].cloud = std::move(cloud); }
+  // utime: of the view the cloud shows. A cloud with another time than the view's result is not used.
+  void OnCloud(int view, std::int64_t utime, PointCloud cloud) {
+    views_[view].cloud = std::move(cloud);
+    views_[view].cloud_utime = utime;
+  }
   void OnTemperature(const fsmsg::part_temperature_t& temperature) {
     views_[temperature.view].temperature = temperature;
   }
@@ -53,6 +57,7 @@ class PartCollector {
   struct View {
     std::optional<fsmsg::view_result_t> result;
     std::optional<PointCloud> cloud;
+    std::int64_t cloud_utime = 0;
     std::optional<fsmsg::part_temperature_t> temperature;
     std::optional<std::string> void_reason;
   };
