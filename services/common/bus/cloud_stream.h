@@ -16,13 +16,15 @@ namespace forgescan {
 
 inline constexpr int kAllViews = -1;
 
-// Slices of at most 4 MB; an empty cloud is one empty slice. `cloud` has normals, sigma_mm and view for every point.
-// Errors: kInvalidArgument (a member is missing).
-Result<std::vector<fsmsg::cloud_slice_t>> SliceCloud(const PointCloud& cloud, std::int64_t utime, int part, int view);
+// Slices of at most 4 MB; an empty cloud is one empty slice. `cloud` has normals, sigma_mm and view for every
+// point. Errors: kInvalidArgument (a member is missing).
+Result<std::vector<fsmsg::cloud_slice_t>> SliceCloud(const PointCloud& cloud, std::int64_t utime, int part,
+                                                     int view);
 
-// Collects slices of several clouds at once, in any order. Slices belong together if part, view and utime are equal: another
-// attempt at a view, or another part with the same number, is another cloud. At most 8 clouds are open; a further one takes
-// the place of the oldest, which on a stream has lost slices that the bus has counted.
+// Collects slices of several clouds at once, in any order. Slices belong together if part, view and utime are
+// equal: another attempt at a view, or another part with the same number, is another cloud. At most 8 clouds
+// are open; a further one takes the place of the oldest, which on a stream has lost slices that the bus has
+// counted.
 class CloudAssembler {
  public:
   static constexpr std::size_t kMaxOpen = 8;

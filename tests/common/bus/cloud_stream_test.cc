@@ -58,7 +58,8 @@ TEST(CloudStream, TwoCloudsMayInterleave) {
 }
 
 TEST(CloudStream, TwoAttemptsAtAViewAreTwoClouds) {
-  const auto first = *SliceCloud(MakeCloud(200'000), 1, 1, 0), second = *SliceCloud(MakeCloud(200'000), 2, 1, 0);
+  const auto first = *SliceCloud(MakeCloud(200'000), 1, 1, 0),
+             second = *SliceCloud(MakeCloud(200'000), 2, 1, 0);
   CloudAssembler assembler;
   EXPECT_FALSE((*assembler.Add(first[0])).has_value());
   EXPECT_FALSE((*assembler.Add(second[1])).has_value()) << "half of each is no cloud";
@@ -67,7 +68,8 @@ TEST(CloudStream, TwoAttemptsAtAViewAreTwoClouds) {
 }
 
 TEST(CloudStream, AnotherSizeAtTheSameViewIsNoContradictionOfTheLastAttempt) {
-  const auto first = *SliceCloud(MakeCloud(200'000), 1, 1, 0), second = *SliceCloud(MakeCloud(150'000), 2, 1, 0);
+  const auto first = *SliceCloud(MakeCloud(200'000), 1, 1, 0),
+             second = *SliceCloud(MakeCloud(150'000), 2, 1, 0);
   CloudAssembler assembler;
   EXPECT_FALSE((*assembler.Add(first[0])).has_value());
   EXPECT_TRUE(assembler.Add(second[0]).ok());
