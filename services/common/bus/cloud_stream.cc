@@ -120,4 +120,9 @@ void CloudAssembler::Forget(int part) {
   open_.EraseIf([part](const Key& key) { return std::get<0>(key) == part; });
 }
 
+void CloudAssembler::Forget(int part, std::int64_t utime) {
+  open_.EraseIf(
+      [part, utime](const Key& key) { return std::get<0>(key) == part && std::get<2>(key) == utime; });
+}
+
 }  // namespace forgescan

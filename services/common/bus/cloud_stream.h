@@ -32,8 +32,9 @@ class CloudAssembler {
   // The whole cloud when this was its last slice; nothing while slices are missing.
   // Errors: kFormat (sizes that contradict each other); the cloud's slices so far are dropped then.
   Result<std::optional<PointCloud>> Add(const fsmsg::cloud_slice_t& slice);
-  // Drops what has come of a part that will not be finished, whatever its utime.
+  // Drops what has come of a part that will not be finished: all of it, or the clouds of this utime.
   void Forget(int part);
+  void Forget(int part, std::int64_t utime);
 
  private:
   struct Open {
