@@ -6,6 +6,14 @@
 
 namespace forgescan {
 
+bool PartCollector::Admits(std::int64_t utime) {
+  if (utime < ignore_before_utime_) {
+    return false;
+  }
+  earliest_utime_ = std::min(earliest_utime_, utime);
+  return true;
+}
+
 void PartCollector::OnViewResult(const fsmsg::view_result_t& result) {
   View& view = views_[result.view];
   if (!view.result.has_value() || result.attempt >= view.result->attempt) {
