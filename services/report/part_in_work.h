@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <optional>
 #include <string>
@@ -19,7 +20,8 @@ namespace forgescan {
 
 struct PartInWork {
   int part = 0;
-  std::int64_t first_utime = 0;  // us since 1970 UTC, of the first message of the part
+  std::int64_t first_utime = 0;  // us since 1970 UTC, of the earliest event known of the part
+  std::int64_t ignore_before_utime = std::numeric_limits<std::int64_t>::min();  // older is of an earlier part
   std::optional<fsmsg::part_arrived_t> arrived;
   std::optional<fsmsg::scan_complete_t> scan;
   std::optional<fsmsg::fusion_result_t> fusion;

@@ -98,20 +98,32 @@ void ReportService::SubscribeDurations() {
   hub_.Subscribe<fsmsg::processing_time_t>(kFusionTime, note);
   hub_.Subscribe<fsmsg::processing_time_t>(kRegistrationTime, note);
   SubscribeState<fsmsg::service_state_t>(
-      hub_.bus(), kServiceState,
-      [this](const fsmsg::service_state_t& state) { tally_.Note(state, hub_.bus().NowUs()); });
+      hub_.bus(), kServiceState, [this](const auto& state) { tally_.Note(state, hub_.bus().NowUs()); });
+}
+
+// The line counts from the beginning again: two arrivals of a number are two parts, and so is an arrival
+// after the events of a part whose own was not seen.
+bool ReportService::EndEarlierPart(const fsmsg::part_arrived_t& arrived) {
+  const auto open = open_.find(arrived.part);
+  const bool unfinished = open != open_.end() && (open->second.work.arrived.has_value() ||
+                                                  open->second.work.first_utime < arrived.utime);
+  if (unfinished) {
+    Finish(arrived.part);
+  }
+  const auto erased = std::erase_if(finished_, [&](const FinishedPart& finished) {
+    return finished.part == arrived.part &&
+           (unfinished || finished.arrived || finished.utime < arrived.utime);
+  });
+  return erased > 0;
 }
 
 void ReportService::OnArrived(const fsmsg::part_arrived_t& message) {
-  if (const auto open = open_.find(message.part);
-      open != open_.end() && open->second.work.arrived.has_value()) {
-    Finish(message.part);  // the line counts from 1 again: this is another part with the same number
-  }
-  std::erase_if(finished_, [&message](const auto& finished) {
-    return finished.first == message.part && finished.second < message.utime;
-  });
+  const bool again = EndEarlierPart(message);
   if (PartInWork* work = Find(message.part, message.utime); work != nullptr) {
     work->arrived = message;
+    if (again) {
+      work->ignore_before_utime = message.utime;
+    }
   }
 }
 
@@ -131,7 +143,9 @@ void ReportService::OnSlice(const fsmsg::cloud_slice_t& message) {
 }
 
 void ReportService::OnDuration(const fsmsg::processing_time_t& message) {
-  PartInWork* judged = pages_.Find(message.part);
+  const auto open = open_.find(message.part);
+  const bool of_open = open != open_.end() && message.utime >= open->second.work.ignore_before_utime;
+  PartInWork* judged = of_open ? nullptr : pages_.Find(message.part);
   PartInWork* work = judged != nullptr ? judged : Find(message.part, message.utime);
   if (work != nullptr) {
     work->duration_us[message.step] += message.duration_us;
@@ -162,10 +176,14 @@ void ReportService::CheckLossesLater() {
 
 PartInWork* ReportService::Find(int part, std::int64_t utime) {
   if (const auto open = open_.find(part); open != open_.end()) {
-    return &open->second.work;
+    PartInWork& work = open->second.work;
+    if (utime < work.ignore_before_utime) {
+      return nullptr;
+    }
+    work.first_utime = std::min(work.first_utime, utime);
+    return &work;
   }
-  const auto same = [part](const auto& finished) { return finished.first == part; };
-  if (std::any_of(finished_.begin(), finished_.end(), same)) {
+  if (std::ranges::find(finished_, part, &FinishedPart::part) != finished_.end()) {
     return nullptr;
   }
   Open& open = open_[part];
@@ -241,7 +259,7 @@ void ReportService::Finish(int part) {
   open_.erase(part);
   assembler_.Forget(part);
   const std::int64_t utime = judged.work.EventUtime();
-  finished_.emplace_back(part, utime);
+  finished_.push_back({part, utime, judged.work.arrived.has_value()});
   if (finished_.size() > kFinishedParts) {
     finished_.pop_front();
   }

@@ -49,6 +49,13 @@ class ReportService {
     PartInWork work;
     Bus::TimerId timeout = 0;
   };
+  // A part that has its verdict.
+  struct FinishedPart {
+    int part = 0;
+    std::int64_t utime = 0;  // of its event
+    bool arrived = false;    // its arrival was seen
+  };
+
   // What the service works with; made by Create().
   struct Parts {
     ReportConfig config;
@@ -67,7 +74,10 @@ class ReportService {
   void OnLoss(bool PartInWork::*hole);
   void CheckLossesLater();
 
-  // The part in work, opened if it is new; nothing if it has its verdict already.
+  // Gives an unfinished part with the number its verdict. True if there was an earlier part with it.
+  bool EndEarlierPart(const fsmsg::part_arrived_t& arrived);
+  // The part in work, opened if it is new; nothing if it has its verdict already, or the message is of an
+  // earlier part with the number.
   PartInWork* Find(int part, std::int64_t utime);
   void FinishIfComplete(int part);
   void Finish(int part);
@@ -88,9 +98,8 @@ class ReportService {
   ServiceTally tally_;
   ReportPages pages_;  // after what it writes with
   CloudAssembler assembler_;
-  std::map<int, Open> open_;  // by part
-  std::deque<std::pair<int, std::int64_t>>
-      finished_;  // the last parts with a verdict and their event time, oldest first
+  std::map<int, Open> open_;           // by part
+  std::deque<FinishedPart> finished_;  // the last ones, oldest first
   Bus::TimerId loss_timer_ = 0;
 };
 

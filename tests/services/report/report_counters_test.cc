@@ -19,9 +19,11 @@ class ReportCountersTest : public ReportServiceTest {
     ASSERT_TRUE(PublishState(line_.bus(), kServiceState, message).ok());
     network_.RunFor(1000);
   }
-  // A whole part up to its verdict.
+  // The rest of a part that has arrived, up to its verdict.
   void Judge(int part) {
-    SendGood(part);
+    ASSERT_TRUE(line_.Publish(kFusionResult, Fusion(part)).ok());
+    SendCloud(part);
+    SendRegistration(part, fsmsg::registration_t::STATUS_CONVERGED);
     const std::size_t before = verdicts_.size();
     ASSERT_TRUE(network_.RunUntilTrue([&] { return verdicts_.size() > before; }, kSecondUs));
   }
