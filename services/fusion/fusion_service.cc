@@ -30,13 +30,13 @@ FusionService::FusionService(StreamHub& hub, ServiceMonitor& monitor, FusionConf
   hub_.Subscribe<fsmsg::part_arrived_t>(kPartArrived, [this](const auto& arrived) { OnArrived(arrived); });
   hub_.Subscribe<fsmsg::view_ready_t>(kViewReady, [this](const auto& ready) { OnViewReady(ready); });
   hub_.Subscribe<fsmsg::view_result_t>(kViewResult, [this](const auto& result) {
-    if (PartCollector* part = Part(result.part)) {
+    if (PartCollector* part = Part(result)) {
       part->OnViewResult(result);
       FinishIfSettled(result.part);
     }
   });
   hub_.Subscribe<fsmsg::part_temperature_t>(kPartTemperature, [this](const auto& temperature) {
-    if (PartCollector* part = Part(temperature.part)) {
+    if (PartCollector* part = Part(temperature)) {
       part->OnTemperature(temperature);
       FinishIfSettled(temperature.part);
     }
@@ -46,29 +46,53 @@ FusionService::FusionService(StreamHub& hub, ServiceMonitor& monitor, FusionConf
   monitor_.SetState(ServiceState::kReady, "waiting for a part");
 }
 
-PartCollector* FusionService::Part(int part) {
-  if (finished_.Find(part) != nullptr) {
+template <typename Message>
+PartCollector* FusionService::Part(const Message& message) {
+  if (finished_.Find(message.part) != nullptr) {
     monitor_.Count("messages_late");
     return nullptr;
   }
-  if (parts_.Find(part) == nullptr) {
-    if (const auto dropped = parts_.Insert(part, PartCollector())) {
+  if (parts_.Find(message.part) == nullptr) {
+    if (const auto dropped = parts_.Insert(message.part, PartCollector())) {
       monitor_.ReportError(
           Fail(ErrorCode::kUntrusted, "part {} never finished and is dropped", dropped->first));
       assembler_.Forget(dropped->first);
     }
   }
-  return parts_.Find(part);
+  PartCollector* part = parts_.Find(message.part);
+  if (!part->Admits(message.utime)) {
+    monitor_.Count("messages_late");
+    return nullptr;
+  }
+  return part;
 }
 
-// A part that arrives after the end of the scan of the last one with its number is another part: the line
-// counts from the beginning again.
-void FusionService::OnArrived(const fsmsg::part_arrived_t& arrived) {
-  const std::int64_t* finished_utime = finished_.Find(arrived.part);
-  if (finished_utime != nullptr && arrived.utime > *finished_utime) {
+// The line counts from the beginning again: two arrivals of a number are two parts, and so is an arrival
+// after the scan of a part whose own was not seen.
+bool FusionService::EndEarlierPart(const fsmsg::part_arrived_t& arrived) {
+  const Finished* finished = finished_.Find(arrived.part);
+  if (finished != nullptr && (finished->arrived || arrived.utime > finished->utime)) {
     finished_.Take(arrived.part);
+    return true;
   }
-  if (PartCollector* part = Part(arrived.part)) {
+  const PartCollector* open = parts_.Find(arrived.part);
+  if (open == nullptr || !open->IsBefore(arrived)) {
+    return false;
+  }
+  parts_.Take(arrived.part);
+  assembler_.Forget(arrived.part);
+  monitor_.ReportError(Fail(ErrorCode::kUntrusted,
+                            "part {} never finished and is dropped: another with its number has arrived",
+                            arrived.part));
+  return true;
+}
+
+void FusionService::OnArrived(const fsmsg::part_arrived_t& arrived) {
+  const bool again = EndEarlierPart(arrived);
+  if (PartCollector* part = Part(arrived)) {
+    if (again) {
+      part->IgnoreBefore(arrived.utime);
+    }
     part->OnArrived(arrived);
     FinishIfSettled(arrived.part);
   }
@@ -84,14 +108,14 @@ void FusionService::OnViewReady(const fsmsg::view_ready_t& ready) {
       ready.robot_body_degc, matrices_.recorded_body_degc, config_.max_body_change_k);
   monitor_.Count("views_off_temperature");
   monitor_.ReportError(Fail(ErrorCode::kUntrusted, "part {} view {}: {}", ready.part, ready.view, reason));
-  PartCollector* part = config_.body_change_voids ? Part(ready.part) : nullptr;
+  PartCollector* part = config_.body_change_voids ? Part(ready) : nullptr;
   if (part != nullptr) {
     part->SetViewVoid(ready.view, reason);
   }
 }
 
 void FusionService::OnCloudSlice(const fsmsg::cloud_slice_t& slice) {
-  PartCollector* part = Part(slice.part);
+  PartCollector* part = Part(slice);
   if (part == nullptr) {
     return;
   }
@@ -99,13 +123,13 @@ void FusionService::OnCloudSlice(const fsmsg::cloud_slice_t& slice) {
   if (!cloud.ok()) {
     monitor_.ReportError(cloud.error());
   } else if (cloud->has_value()) {
-    part->OnCloud(slice.view, std::move(**cloud));
+    part->OnCloud(slice.view, slice.utime, std::move(**cloud));
     FinishIfSettled(slice.part);
   }
 }
 
 void FusionService::OnScanComplete(const fsmsg::scan_complete_t& scan) {
-  PartCollector* collector = Part(scan.part);
+  PartCollector* collector = Part(scan);
   if (collector == nullptr) {
     return;
   }
@@ -125,7 +149,7 @@ void FusionService::FinishIfSettled(int part) {
   const PartCollector* collector = parts_.Find(part);
   if (collector != nullptr && collector->Settled()) {
     auto settled = parts_.Take(part);
-    finished_.Insert(part, settled->scan()->utime);
+    finished_.Insert(part, {settled->scan()->utime, settled->arrived().has_value()});
     assembler_.Forget(part);
     Finish(part, *settled);
   }

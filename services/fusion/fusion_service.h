@@ -2,8 +2,8 @@
 #pragma once
 
 #include "fsmsg/view_ready_t.hpp"
+#include "services/common/aged_map.h"
 #include "services/common/bus/cloud_stream.h"
-#include "services/common/service/aged_map.h"
 #include "services/common/service/service_monitor.h"
 #include "services/fusion/fuse.h"
 #include "services/fusion/fusion_config.h"
@@ -17,8 +17,18 @@ class FusionService {
                 ExpansionCurve curve);
 
  private:
-  // Nothing if the part has its result: what still comes of it must not begin it again.
-  PartCollector* Part(int part);
+  // A part that has its result.
+  struct Finished {
+    std::int64_t utime = 0;  // of the end of the scan
+    bool arrived = false;    // its arrival was seen
+  };
+
+  // The part a message belongs to. Nothing if that has its result, or is an earlier one with the number: what
+  // still comes of it must not begin it again.
+  template <typename Message>
+  PartCollector* Part(const Message& message);
+  // Drops what is left of an earlier part with the number. True if there was one.
+  bool EndEarlierPart(const fsmsg::part_arrived_t& arrived);
   void OnArrived(const fsmsg::part_arrived_t& arrived);
   void OnViewReady(const fsmsg::view_ready_t& ready);
   void OnCloudSlice(const fsmsg::cloud_slice_t& slice);
@@ -35,8 +45,8 @@ class FusionService {
   ViewMatrices matrices_;
   ExpansionCurve curve_;
   CloudAssembler assembler_;
-  AgedMap<int, PartCollector> parts_;    // in work
-  AgedMap<int, std::int64_t> finished_;  // utime of the end of the scan
+  AgedMap<int, PartCollector> parts_;  // in work
+  AgedMap<int, Finished> finished_;
 };
 
 }  // namespace forgescan

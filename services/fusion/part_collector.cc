@@ -6,6 +6,14 @@
 
 namespace forgescan {
 
+bool PartCollector::Admits(std::int64_t utime) {
+  if (utime < ignore_before_utime_) {
+    return false;
+  }
+  earliest_utime_ = std::min(earliest_utime_, utime);
+  return true;
+}
+
 void PartCollector::OnViewResult(const fsmsg::view_result_t& result) {
   View& view = views_[result.view];
   if (!view.result.has_value() || result.attempt >= view.result->attempt) {
@@ -23,7 +31,8 @@ std::optional<std::string> PartCollector::VoidReason(const View& view) const {
   if (view.temperature.has_value() && view.temperature->valid != 1) {
     return "the pyrometer gave no part temperature";
   }
-  if (view.result.has_value() && view.cloud.has_value() && view.temperature.has_value()) {
+  if (view.result.has_value() && view.cloud.has_value() && view.cloud_utime == view.result->utime &&
+      view.temperature.has_value()) {
     const bool whole = static_cast<std::size_t>(view.result->points) == view.cloud->size();
     return whole ? std::string() : "the cloud is not the one the reconstruction announced";
   }

@@ -7,6 +7,7 @@
 // Events may come in any order and more than once; a newer attempt at a view replaces an older one.
 #pragma once
 
+#include <limits>
 #include <map>
 #include <optional>
 #include <string>
@@ -23,9 +24,23 @@ namespace forgescan {
 
 class PartCollector {
  public:
+  // us since 1970 UTC; what is older is of an earlier part with the number.
+  void IgnoreBefore(std::int64_t utime) { ignore_before_utime_ = utime; }
+  // Notes the time of an event of the part. False: the event is of an earlier part, and not to be handed
+  // over.
+  bool Admits(std::int64_t utime);
+  // The arrival is not of this part but of a later one: this one has arrived already, or has older news.
+  bool IsBefore(const fsmsg::part_arrived_t& arrived) const {
+    return arrived_.has_value() || earliest_utime_ < arrived.utime;
+  }
+
   void OnArrived(const fsmsg::part_arrived_t& arrived) { arrived_ = arrived; }
   void OnViewResult(const fsmsg::view_result_t& result);
-  void OnCloud(int view, PointCloud cloud) { views_[view].cloud = std::move(cloud); }
+  // utime: of the view the cloud shows. A cloud with another time than the view's result is not used.
+  void OnCloud(int view, std::int64_t utime, PointCloud cloud) {
+    views_[view].cloud = std::move(cloud);
+    views_[view].cloud_utime = utime;
+  }
   void OnTemperature(const fsmsg::part_temperature_t& temperature) {
     views_[temperature.view].temperature = temperature;
   }
@@ -53,6 +68,7 @@ class PartCollector {
   struct View {
     std::optional<fsmsg::view_result_t> result;
     std::optional<PointCloud> cloud;
+    std::int64_t cloud_utime = 0;
     std::optional<fsmsg::part_temperature_t> temperature;
     std::optional<std::string> void_reason;
   };
@@ -60,6 +76,8 @@ class PartCollector {
   std::optional<std::string> VoidReason(const View& view) const;
   bool AllCapturedHaveResults() const;
 
+  std::int64_t ignore_before_utime_ = std::numeric_limits<std::int64_t>::min();
+  std::int64_t earliest_utime_ = std::numeric_limits<std::int64_t>::max();
   std::optional<fsmsg::part_arrived_t> arrived_;
   std::optional<fsmsg::scan_complete_t> scan_;
   std::optional<std::string> expired_;

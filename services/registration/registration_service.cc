@@ -63,15 +63,15 @@ RegistrationService::RegistrationService(StreamHub& hub, ServiceMonitor& monitor
   monitor_.SetState(ServiceState::kReady, "waiting for a part");
 }
 
-RegistrationService::Part& RegistrationService::InWork(int part) {
-  if (parts_.Find(part) == nullptr) {
-    if (const auto dropped = parts_.Insert(part, Part())) {
-      monitor_.ReportError(
-          Fail(ErrorCode::kUntrusted, "part {} never became complete and is dropped", dropped->first));
-      assembler_.Forget(dropped->first);
+RegistrationService::Part& RegistrationService::InWork(Key key) {
+  if (parts_.Find(key) == nullptr) {
+    if (const auto dropped = parts_.Insert(key, Part())) {
+      const auto [part, utime] = dropped->first;
+      monitor_.ReportError(Fail(ErrorCode::kUntrusted, "part {} never became complete and is dropped", part));
+      assembler_.Forget(part, utime);
     }
   }
-  return *parts_.Find(part);
+  return *parts_.Find(key);
 }
 
 void RegistrationService::OnSlice(const fsmsg::cloud_slice_t& slice) {
@@ -80,26 +80,28 @@ void RegistrationService::OnSlice(const fsmsg::cloud_slice_t& slice) {
     return monitor_.ReportError(cloud.error());
   }
   if (cloud->has_value()) {
-    InWork(slice.part).cloud_in_array = std::move(**cloud);
-    FinishIfComplete(slice.part);
+    const Key key{slice.part, slice.utime};
+    InWork(key).cloud_in_array = std::move(**cloud);
+    FinishIfComplete(key);
   }
 }
 
 void RegistrationService::OnFusion(const fsmsg::fusion_result_t& fusion) {
-  InWork(fusion.part).fusion = fusion;
-  FinishIfComplete(fusion.part);
+  const Key key{fusion.part, fusion.utime};
+  InWork(key).fusion = fusion;
+  FinishIfComplete(key);
   const auto timeout_us = static_cast<std::int64_t>(config_.cloud_timeout_s * 1e6);
-  hub_.bus().At(hub_.bus().NowUs() + timeout_us, [this, part = fusion.part, utime = fusion.utime] {
-    const Part* late = parts_.Find(part);
-    if (late != nullptr && late->fusion.has_value() && late->fusion->utime == utime) {
-      GiveUp(part);
+  hub_.bus().At(hub_.bus().NowUs() + timeout_us, [this, key] {
+    const Part* late = parts_.Find(key);
+    if (late != nullptr && late->fusion.has_value()) {
+      GiveUp(key);
     }
   });
 }
 
-void RegistrationService::GiveUp(int part) {
-  const auto taken = parts_.Take(part);
-  assembler_.Forget(part);
+void RegistrationService::GiveUp(Key key) {
+  const auto taken = parts_.Take(key);
+  assembler_.Forget(key.first, key.second);
   Message message = NoPose(*taken->fusion);
   message.status = Message::STATUS_FAILED;
   message.reason =
@@ -109,8 +111,8 @@ void RegistrationService::GiveUp(int part) {
   }
 }
 
-void RegistrationService::FinishIfComplete(int part) {
-  const Part* found = parts_.Find(part);
+void RegistrationService::FinishIfComplete(Key key) {
+  const Part* found = parts_.Find(key);
   if (found == nullptr || !found->fusion.has_value()) {
     return;
   }
@@ -118,7 +120,7 @@ void RegistrationService::FinishIfComplete(int part) {
   if (has_cloud && !found->cloud_in_array.has_value()) {
     return;
   }
-  const auto taken = parts_.Take(part);
+  const auto taken = parts_.Take(key);
   lost_.clear();  // whatever it was, it did not hold up this part
   Finish(*taken->fusion, taken->cloud_in_array.value_or(PointCloud()));
 }

@@ -3,11 +3,12 @@
 
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "fsmsg/fusion_result_t.hpp"
 #include "fsmsg/registration_t.hpp"
+#include "services/common/aged_map.h"
 #include "services/common/bus/cloud_stream.h"
-#include "services/common/service/aged_map.h"
 #include "services/common/service/service_monitor.h"
 #include "services/registration/registration_config.h"
 
@@ -24,12 +25,15 @@ class RegistrationService {
     std::optional<fsmsg::fusion_result_t> fusion;
   };
 
-  Part& InWork(int part);
+  // Number and time of the scan's end: a line that counts from 1 again makes other parts with old numbers.
+  using Key = std::pair<int, std::int64_t>;
+
+  Part& InWork(Key key);
   void OnFusion(const fsmsg::fusion_result_t& fusion);
   void OnSlice(const fsmsg::cloud_slice_t& slice);
-  void FinishIfComplete(int part);
+  void FinishIfComplete(Key key);
   // The part's cloud did not come in time: says so, instead of nothing.
-  void GiveUp(int part);
+  void GiveUp(Key key);
   void Finish(const fsmsg::fusion_result_t& fusion, const PointCloud& cloud_in_array);
   // Fills the message from a registration, or with the reason why there is none; returns the part's points.
   PointCloud Register(const PointCloud& cloud_in_array, fsmsg::registration_t& message) const;
@@ -40,7 +44,7 @@ class RegistrationService {
   RegistrationConfig config_;
   RegistrationModel model_;
   CloudAssembler assembler_;
-  AgedMap<int, Part> parts_;  // in work
+  AgedMap<Key, Part> parts_;  // in work
   std::string lost_;          // the last slices the bus gave up; empty = none
 };
 

@@ -94,10 +94,11 @@ bool PartInWork::converged() const {
   return registration.has_value() && registration->status == fsmsg::registration_t::STATUS_CONVERGED;
 }
 
-bool PartInWork::Complete() const {
-  return registration.has_value() && fusion.has_value() &&
-         (!converged() || cloud_in_model.has_value() || !cloud_error.empty());
+bool PartInWork::CloudSettled() const {
+  return registration.has_value() && (!converged() || cloud_in_model.has_value() || !cloud_error.empty());
 }
+
+bool PartInWork::Complete() const { return fusion.has_value() && CloudSettled(); }
 
 std::string PartInWork::Obstacle() const {
   if (registration.has_value() && !converged()) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <optional>
 #include <string>
@@ -13,21 +14,29 @@
 #include "fsmsg/verdict_t.hpp"
 #include "services/common/geometry/point_cloud.h"
 #include "services/report/part_report.h"
+#include "services/report/service_tally.h"
 
 namespace forgescan {
 
 struct PartInWork {
   int part = 0;
-  std::int64_t first_utime = 0;  // us since 1970 UTC, of the first message of the part
+  std::int64_t first_utime = 0;  // us since 1970 UTC, of the earliest event known of the part
+  std::int64_t ignore_before_utime = std::numeric_limits<std::int64_t>::min();  // older is of an earlier part
   std::optional<fsmsg::part_arrived_t> arrived;
   std::optional<fsmsg::scan_complete_t> scan;
   std::optional<fsmsg::fusion_result_t> fusion;
   std::optional<fsmsg::registration_t> registration;
+  std::int64_t registration_us = 0;  // when it arrived
   std::optional<PointCloud> cloud_in_model;
   std::string cloud_error;  // why the cloud cannot be used; empty = nothing wrong so far
   std::map<std::string, std::int64_t> duration_us;  // by step, summed over the views
+  ServiceSums sums_at_opening;
+  bool fusion_hole = false;  // results of the fusion were given up meanwhile, of this part or of others
+  bool cloud_hole = false;   // slices of registered clouds were
 
   bool converged() const;
+  // The cloud is here, or there is none to wait for.
+  bool CloudSettled() const;
   // Everything a verdict needs, and the fusion's word on the views, is here.
   bool Complete() const;
   // Why the part cannot be measured from what is here, one sentence; empty if it can.

@@ -53,12 +53,13 @@ struct ReportedTiming {
   double last_frame_to_verdict = kNotKnown;  // event time of the last view to the verdict
 };
 
+// Of this part alone; README.md says what each counts. Nothing = not known.
 struct ReportedCounters {
-  std::int64_t frames_expected = 0;
-  std::int64_t frames_used = 0;
-  std::int64_t frames_lost = 0;
-  std::int64_t messages_missing = 0;  // given up by any service since it started
-  std::int64_t restarts = 0;          // of any service, since the report service started
+  std::optional<std::int64_t> frames_expected;
+  std::optional<std::int64_t> frames_used;
+  std::optional<std::int64_t> frames_lost;
+  std::optional<std::int64_t> messages_missing;
+  std::optional<std::int64_t> restarts;
 };
 
 // How one dimension moved over the last parts, this one included.

@@ -10,7 +10,7 @@ namespace forgescan {
 struct ReportConfig {
   double part_timeout_s =
       180.0;  // from the first word of a part to its verdict; above scan, fusion and registration
-  double loss_settle_s = 2.0;       // from a lost message to the verdict on parts that wait for it
+  double loss_settle_s = 2.0;       // between looks at parts that may lack a lost message
   double page_delay_s = 0.5;        // from the verdict to the page: durations that come late still get on it
   int trend_parts = 25;             // last parts drawn and fitted
   int index_parts = 200;            // last parts listed in index.html

@@ -59,8 +59,8 @@ std::string Overview(const PartReport& report) {
       Tile("Dimensions measured", fmt::format("{} of {}", measured, report.dimensions.size()));
   tiles += Tile("Sizes hold at", WithUnit(report.reference_degc, 1, "&deg;C"));
   tiles += Tile("Views used", fmt::format("{} of {}", used, report.views.size()));
-  tiles += Tile("Frames lost",
-                fmt::format("{} of {}", report.counters.frames_lost, report.counters.frames_expected));
+  tiles += Tile("Frames lost", fmt::format("{} of {}", CountText(report.counters.frames_lost),
+                                           CountText(report.counters.frames_expected)));
   tiles += Tile("Alignment rms", WithUnit(report.registration.rms_mm, 3, "mm"));
   tiles += Tile("Last frame to verdict", WithUnit(report.timing_s.last_frame_to_verdict, 2, "s"));
   return "<section><div class=\"tiles\">" + tiles + "</div></section>\n";
@@ -169,15 +169,15 @@ std::string Registration(const ReportedRegistration& from) {
 std::string TimingAndCounters(const PartReport& report) {
   const ReportedTiming& took = report.timing_s;
   const ReportedCounters& counted = report.counters;
-  std::string rows =
-      Figure("Scan", WithUnit(took.scan, 2, "s")) +
-      Figure("Reconstruction, all views", WithUnit(took.reconstruction, 3, "s")) +
-      Figure("Fusion", WithUnit(took.fusion, 3, "s")) +
-      Figure("Alignment", WithUnit(took.registration, 3, "s")) +
-      Figure("Measurement and verdict", WithUnit(took.report, 3, "s")) +
-      Figure("Frames used", fmt::format("{} of {}", counted.frames_used, counted.frames_expected)) +
-      Figure("Messages given up since start", CountText(counted.messages_missing)) +
-      Figure("Restarts of services", CountText(counted.restarts));
+  std::string rows = Figure("Scan", WithUnit(took.scan, 2, "s")) +
+                     Figure("Reconstruction, all views", WithUnit(took.reconstruction, 3, "s")) +
+                     Figure("Fusion", WithUnit(took.fusion, 3, "s")) +
+                     Figure("Alignment", WithUnit(took.registration, 3, "s")) +
+                     Figure("Measurement and verdict", WithUnit(took.report, 3, "s")) +
+                     Figure("Frames used", fmt::format("{} of {}", CountText(counted.frames_used),
+                                                       CountText(counted.frames_expected))) +
+                     Figure("Messages given up meanwhile", CountText(counted.messages_missing)) +
+                     Figure("Restarts of services meanwhile", CountText(counted.restarts));
   return Section("Timing and transport", "<table><tbody>" + rows + "</tbody></table>");
 }
 

@@ -11,6 +11,9 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 Json Number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+Json Count(const std::optional<std::int64_t>& value) {
+  return value.has_value() ? Json(*value) : Json(nullptr);
+}
 Json Time(std::int64_t utime) { return utime > 0 ? Json(utime) : Json(nullptr); }
 
 Json Dimension(const JudgedDimension& from) {
@@ -67,11 +70,11 @@ Json Timing(const ReportedTiming& from) {
 }
 
 Json Counters(const ReportedCounters& from) {
-  return {{"frames_expected", from.frames_expected},
-          {"frames_used", from.frames_used},
-          {"frames_lost", from.frames_lost},
-          {"messages_missing", from.messages_missing},
-          {"restarts", from.restarts}};
+  return {{"frames_expected", Count(from.frames_expected)},
+          {"frames_used", Count(from.frames_used)},
+          {"frames_lost", Count(from.frames_lost)},
+          {"messages_missing", Count(from.messages_missing)},
+          {"restarts", Count(from.restarts)}};
 }
 
 template <typename Item, typename Write>

@@ -51,7 +51,8 @@ ReportService::ReportService(StreamHub& hub, ServiceMonitor& monitor, Parts part
       config_(parts.config),
       station_(std::move(parts.station)),
       writer_(std::move(parts.writer)),
-      evaluator_(evaluator) {
+      evaluator_(evaluator),
+      pages_(hub.bus(), monitor, station_.name, {config_, writer_, evaluator_, tally_}) {
   Subscribe();
   SubscribeDurations();
   hub_.Advertise(kVerdict);
@@ -59,15 +60,10 @@ ReportService::ReportService(StreamHub& hub, ServiceMonitor& monitor, Parts part
 }
 
 ReportService::~ReportService() {
-  while (!judged_.empty()) {
-    WritePage(judged_.begin()->first);
-  }
   for (const auto& [part, open] : open_) {
     hub_.bus().Cancel(open.timeout);
   }
-  for (const Bus::TimerId timer : loss_timers_) {
-    hub_.bus().Cancel(timer);
-  }
+  hub_.bus().Cancel(loss_timer_);
 }
 
 void ReportService::Subscribe() {
@@ -86,13 +82,14 @@ void ReportService::Subscribe() {
   hub_.Subscribe<fsmsg::registration_t>(kRegistration, [this](const auto& message) {
     if (PartInWork* work = Find(message.part, message.utime); work != nullptr) {
       work->registration = message;
+      work->registration_us = hub_.bus().NowUs();
       FinishIfComplete(message.part);
     }
   });
   hub_.Subscribe<fsmsg::cloud_slice_t>(kRegisteredCloud, [this](const auto& message) { OnSlice(message); });
   hub_.Subscribe<fsmsg::part_sorted_t>(kPartSorted, [this](const auto& message) { OnSorted(message); });
-  hub_.OnLost(kRegisteredCloud, [this](std::int64_t, std::int64_t) { OnLoss(); });
-  hub_.OnLost(kFusionResult, [this](std::int64_t, std::int64_t) { OnLoss(); });
+  hub_.OnLost(kRegisteredCloud, [this](std::int64_t, std::int64_t) { OnLoss(&PartInWork::cloud_hole); });
+  hub_.OnLost(kFusionResult, [this](std::int64_t, std::int64_t) { OnLoss(&PartInWork::fusion_hole); });
 }
 
 void ReportService::SubscribeDurations() {
@@ -100,20 +97,33 @@ void ReportService::SubscribeDurations() {
   hub_.Subscribe<fsmsg::processing_time_t>(kReconstructionTime, note);
   hub_.Subscribe<fsmsg::processing_time_t>(kFusionTime, note);
   hub_.Subscribe<fsmsg::processing_time_t>(kRegistrationTime, note);
-  SubscribeState<fsmsg::service_state_t>(hub_.bus(), kServiceState,
-                                         [this](const fsmsg::service_state_t& state) { tally_.Note(state); });
+  SubscribeState<fsmsg::service_state_t>(
+      hub_.bus(), kServiceState, [this](const auto& state) { tally_.Note(state, hub_.bus().NowUs()); });
+}
+
+// The line counts from the beginning again: two arrivals of a number are two parts, and so is an arrival
+// after the events of a part whose own was not seen.
+bool ReportService::EndEarlierPart(const fsmsg::part_arrived_t& arrived) {
+  const auto open = open_.find(arrived.part);
+  const bool unfinished = open != open_.end() && (open->second.work.arrived.has_value() ||
+                                                  open->second.work.first_utime < arrived.utime);
+  if (unfinished) {
+    Finish(arrived.part);
+  }
+  const auto erased = std::erase_if(finished_, [&](const FinishedPart& finished) {
+    return finished.part == arrived.part &&
+           (unfinished || finished.arrived || finished.utime < arrived.utime);
+  });
+  return erased > 0;
 }
 
 void ReportService::OnArrived(const fsmsg::part_arrived_t& message) {
-  if (const auto open = open_.find(message.part);
-      open != open_.end() && open->second.work.arrived.has_value()) {
-    Finish(message.part);  // the line counts from 1 again: this is another part with the same number
-  }
-  std::erase_if(finished_, [&message](const auto& finished) {
-    return finished.first == message.part && finished.second < message.utime;
-  });
+  const bool again = EndEarlierPart(message);
   if (PartInWork* work = Find(message.part, message.utime); work != nullptr) {
     work->arrived = message;
+    if (again) {
+      work->ignore_before_utime = message.utime;
+    }
   }
 }
 
@@ -133,9 +143,11 @@ void ReportService::OnSlice(const fsmsg::cloud_slice_t& message) {
 }
 
 void ReportService::OnDuration(const fsmsg::processing_time_t& message) {
-  if (const auto judged = judged_.find(message.part); judged != judged_.end()) {
-    judged->second.work.duration_us[message.step] += message.duration_us;
-  } else if (PartInWork* work = Find(message.part, message.utime); work != nullptr) {
+  const auto open = open_.find(message.part);
+  const bool of_open = open != open_.end() && message.utime >= open->second.work.ignore_before_utime;
+  PartInWork* judged = of_open ? nullptr : pages_.Find(message.part);
+  PartInWork* work = judged != nullptr ? judged : Find(message.part, message.utime);
+  if (work != nullptr) {
     work->duration_us[message.step] += message.duration_us;
   }
 }
@@ -148,27 +160,36 @@ void ReportService::OnSorted(const fsmsg::part_sorted_t& message) {
   }
 }
 
-void ReportService::OnLoss() {
+void ReportService::OnLoss(bool PartInWork::*hole) {
   monitor_.Count("holes");
-  const auto timer = std::make_shared<Bus::TimerId>();
-  *timer = hub_.bus().At(hub_.bus().NowUs() + Us(config_.loss_settle_s), [this, timer] {
-    loss_timers_.erase(*timer);
-    FinishAfterLoss();
-  });
-  loss_timers_.insert(*timer);
+  for (auto& [part, open] : open_) {
+    open.work.*hole = true;
+  }
+  CheckLossesLater();
+}
+
+void ReportService::CheckLossesLater() {
+  hub_.bus().Cancel(loss_timer_);
+  loss_timer_ =
+      hub_.bus().At(hub_.bus().NowUs() + Us(config_.loss_settle_s), [this] { FinishWhatWaitsInVain(); });
 }
 
 PartInWork* ReportService::Find(int part, std::int64_t utime) {
   if (const auto open = open_.find(part); open != open_.end()) {
-    return &open->second.work;
+    PartInWork& work = open->second.work;
+    if (utime < work.ignore_before_utime) {
+      return nullptr;
+    }
+    work.first_utime = std::min(work.first_utime, utime);
+    return &work;
   }
-  const auto same = [part](const auto& finished) { return finished.first == part; };
-  if (std::any_of(finished_.begin(), finished_.end(), same)) {
+  if (std::ranges::find(finished_, part, &FinishedPart::part) != finished_.end()) {
     return nullptr;
   }
   Open& open = open_[part];
   open.work.part = part;
   open.work.first_utime = utime;
+  open.work.sums_at_opening = tally_.Sums();
   open.timeout = hub_.bus().At(hub_.bus().NowUs() + Us(config_.part_timeout_s), [this, part] {
     monitor_.Count("parts_timed_out");
     Finish(part);
@@ -183,15 +204,31 @@ void ReportService::FinishIfComplete(int part) {
   }
 }
 
-void ReportService::FinishAfterLoss() {
-  std::vector<int> waiting;
+// Cloud and fusion's result are sent before the registration; a while after it they have been announced at
+// least.
+bool ReportService::WaitsInVain(const PartInWork& work) const {
+  if (!work.registration.has_value() ||
+      hub_.bus().NowUs() < work.registration_us + Us(config_.loss_settle_s)) {
+    return false;
+  }
+  const bool fusion_lost = work.fusion_hole && !hub_.Waiting(kFusionResult);
+  const bool cloud_lost = work.cloud_hole && !hub_.Waiting(kRegisteredCloud);
+  return (work.fusion.has_value() || fusion_lost) && (work.CloudSettled() || cloud_lost);
+}
+
+void ReportService::FinishWhatWaitsInVain() {
+  std::vector<int> in_vain;
+  bool others = false;
   for (const auto& [part, open] : open_) {
-    if (open.work.registration.has_value()) {
-      waiting.push_back(part);
+    if (WaitsInVain(open.work)) {
+      in_vain.push_back(part);
+    } else {
+      others = others || open.work.cloud_hole || open.work.fusion_hole;
     }
   }
-  for (const int part : waiting) {
-    Finish(part);
+  std::for_each(in_vain.begin(), in_vain.end(), [this](int part) { Finish(part); });
+  if (others) {
+    CheckLossesLater();
   }
 }
 
@@ -200,8 +237,6 @@ PartReport ReportService::Judge(const PartInWork& work) const {
   report.station = station_.name;
   report.software_version = station_.software_version;
   report.config_hash = station_.config_hash;
-  report.counters.messages_missing = tally_.messages_missing();
-  report.counters.restarts = tally_.restarts();
   const std::string obstacle = work.Obstacle();
   const auto measured = obstacle.empty() ? evaluator_.Evaluate(*work.cloud_in_model)
                                          : Result<std::vector<MeasuredDimension>>(evaluator_.Dimensions());
@@ -217,17 +252,14 @@ PartReport ReportService::Judge(const PartInWork& work) const {
 }
 
 void ReportService::Finish(int part) {
-  if (judged_.contains(part)) {
-    WritePage(part);  // an earlier part with this number
-  }
   const std::int64_t started_us = hub_.bus().NowUs();
-  Judged judged;
+  JudgedPart judged;
   judged.work = std::move(open_.at(part).work);
   hub_.bus().Cancel(open_.at(part).timeout);
   open_.erase(part);
   assembler_.Forget(part);
   const std::int64_t utime = judged.work.EventUtime();
-  finished_.emplace_back(part, utime);
+  finished_.push_back({part, utime, judged.work.arrived.has_value()});
   if (finished_.size() > kFinishedParts) {
     finished_.pop_front();
   }
@@ -240,9 +272,7 @@ void ReportService::Finish(int part) {
   }
   judged.folder_name = ReportFolderName(part, utime);
   Publish(report, utime);
-  judged.page =
-      hub_.bus().At(report.verdict_utime + Us(config_.page_delay_s), [this, part] { WritePage(part); });
-  judged_[part] = std::move(judged);
+  pages_.Add(std::move(judged));
   TellState();
 }
 
@@ -253,29 +283,6 @@ void ReportService::Publish(const PartReport& report, std::int64_t utime) {
   Note(hub_.Publish(kVerdict, VerdictMessage(report, utime, folder_name)));
   Note(writer_.Remember(report, utime));
   monitor_.Count(CounterName(report.verdict.verdict));
-}
-
-void ReportService::WritePage(int part) {
-  Judged judged = std::move(judged_.extract(part).mapped());
-  hub_.bus().Cancel(judged.page);
-  PartReport& report = judged.report;
-  report.timing_s = WithSteps(report.timing_s, judged.work);
-  if (Result<std::vector<ReportedTrend>> trends = writer_.Trends(report); trends.ok()) {
-    report.trends = std::move(*trends);
-  } else {
-    Note(trends.error());
-  }
-  if (judged.work.converged() && judged.work.cloud_in_model.has_value()) {
-    Result<std::vector<std::uint8_t>> picture = PictureOf(*judged.work.cloud_in_model, evaluator_, config_);
-    if (picture.ok()) {
-      report.deviation_picture = std::move(*picture);
-    } else {
-      Note(picture.error());
-    }
-  }
-  Note(writer_.WriteJson(report, judged.folder_name));
-  Note(writer_.WritePage(report, judged.folder_name));
-  Note(writer_.WriteIndex(station_.name));
 }
 
 void ReportService::TellState() {

@@ -5,7 +5,6 @@
 #include <deque>
 #include <map>
 #include <memory>
-#include <set>
 #include <string>
 #include <utility>
 
@@ -18,6 +17,7 @@
 #include "services/report/part_evaluator.h"
 #include "services/report/part_in_work.h"
 #include "services/report/report_config.h"
+#include "services/report/report_pages.h"
 #include "services/report/report_writer.h"
 #include "services/report/service_tally.h"
 
@@ -49,12 +49,11 @@ class ReportService {
     PartInWork work;
     Bus::TimerId timeout = 0;
   };
-  // A part that has its verdict, but not its page.
-  struct Judged {
-    PartInWork work;
-    PartReport report;
-    std::string folder_name;
-    Bus::TimerId page = 0;
+  // A part that has its verdict.
+  struct FinishedPart {
+    int part = 0;
+    std::int64_t utime = 0;  // of its event
+    bool arrived = false;    // its arrival was seen
   };
 
   // What the service works with; made by Create().
@@ -71,17 +70,22 @@ class ReportService {
   void OnSlice(const fsmsg::cloud_slice_t& message);
   void OnDuration(const fsmsg::processing_time_t& message);
   void OnSorted(const fsmsg::part_sorted_t& message);
-  void OnLoss();
+  // Notes for every part in work that a message of one stream was given up, which may have been its own.
+  void OnLoss(bool PartInWork::*hole);
+  void CheckLossesLater();
 
-  // The part in work, opened if it is new; nothing if it has its verdict already.
+  // Gives an unfinished part with the number its verdict. True if there was an earlier part with it.
+  bool EndEarlierPart(const fsmsg::part_arrived_t& arrived);
+  // The part in work, opened if it is new; nothing if it has its verdict already, or the message is of an
+  // earlier part with the number.
   PartInWork* Find(int part, std::int64_t utime);
   void FinishIfComplete(int part);
   void Finish(int part);
-  // Parts whose registration is known, but whose other messages will not come any more.
-  void FinishAfterLoss();
+  // What the part lacks was given up: its stream has a hole, and nothing is under way on it any more.
+  bool WaitsInVain(const PartInWork& work) const;
+  void FinishWhatWaitsInVain();
   PartReport Judge(const PartInWork& work) const;
   void Publish(const PartReport& report, std::int64_t utime);
-  void WritePage(int part);
   void TellState();
   void Note(const Status& status);
 
@@ -92,12 +96,11 @@ class ReportService {
   ReportWriter writer_;
   const PartEvaluator& evaluator_;
   ServiceTally tally_;
+  ReportPages pages_;  // after what it writes with
   CloudAssembler assembler_;
-  std::map<int, Open> open_;      // by part
-  std::map<int, Judged> judged_;  // by part
-  std::deque<std::pair<int, std::int64_t>>
-      finished_;  // the last parts with a verdict and their event time, oldest first
-  std::set<Bus::TimerId> loss_timers_;
+  std::map<int, Open> open_;           // by part
+  std::deque<FinishedPart> finished_;  // the last ones, oldest first
+  Bus::TimerId loss_timer_ = 0;
 };
 
 }  // namespace forgescan

@@ -99,6 +99,10 @@ std::string CountText(std::int64_t value) {
   return grouped;
 }
 
+std::string CountText(const std::optional<std::int64_t>& value) {
+  return value.has_value() ? CountText(*value) : std::string(kDash);
+}
+
 std::string Base64(std::span<const std::uint8_t> bytes) {
   constexpr std::string_view kAlphabet = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
   std::string text;

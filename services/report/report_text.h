@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -19,8 +20,10 @@ std::string EscapeHtml(std::string_view text);
 // With so many decimals and a true minus sign; "–" for NaN. The signed form writes + too.
 std::string NumberText(double value, int decimals);
 std::string SignedText(double value, int decimals);
-// 23 612 448: groups of three, thin spaces that do not break.
+// 23 612 448: groups of three, thin spaces that do not break; the second form writes "–" for what is not
+// known.
 std::string CountText(std::int64_t value);
+std::string CountText(const std::optional<std::int64_t>& value);
 
 std::string Base64(std::span<const std::uint8_t> bytes);
 

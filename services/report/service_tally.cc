@@ -1,23 +1,37 @@
 #include "services/report/service_tally.h"
 
+#include <algorithm>
+
 namespace forgescan {
 
-std::int64_t ServiceTally::messages_missing() const {
-  std::int64_t sum = 0;
-  for (const auto& [key, missing] : missing_) {
-    sum += missing;
+void ServiceTally::Note(const fsmsg::service_state_t& state, std::int64_t now_us) {
+  const auto [found, first_word] = services_.try_emplace(state.name);
+  Service& service = found->second;
+  if (first_word) {
+    service.missing_before = state.messages_missing;
   }
-  return sum;
+  std::int64_t& missing = service.missing[state.session];
+  missing = std::max(missing, state.messages_missing);
+  service.heard_us = now_us;
+  service.stopping = state.state == fsmsg::service_state_t::STATE_STOPPING;
 }
 
-std::int64_t ServiceTally::restarts() const {
-  std::int64_t restarts = 0;
-  const std::string* last = nullptr;
-  for (const auto& [key, missing] : missing_) {  // sorted by name
-    restarts += last != nullptr && *last == key.first ? 1 : 0;
-    last = &key.first;
+ServiceSums ServiceTally::Sums() const {
+  ServiceSums sums;
+  for (const auto& [name, service] : services_) {
+    sums.restarts += static_cast<std::int64_t>(service.missing.size()) - 1;
+    sums.messages_missing -= service.missing_before;
+    for (const auto& [session, missing] : service.missing) {
+      sums.messages_missing += missing;
+    }
   }
-  return restarts;
+  return sums;
+}
+
+bool ServiceTally::HeardSince(std::int64_t since_us) const {
+  return std::all_of(services_.begin(), services_.end(), [since_us](const auto& entry) {
+    return entry.second.stopping || entry.second.heard_us >= since_us;
+  });
 }
 
 }  // namespace forgescan

@@ -1,28 +1,39 @@
-// What all services together say they have lost, and how often they were started anew.
+// What the services say they have lost, and how often they were started anew. Pure: the caller gives the
+// time.
 #pragma once
 
 #include <cstdint>
 #include <map>
 #include <string>
-#include <utility>
 
 #include "fsmsg/service_state_t.hpp"
 
 namespace forgescan {
 
+// Sums over all services. The difference of two is what happened between them.
+struct ServiceSums {
+  std::int64_t messages_missing = 0;  // given up, since each service was first heard
+  std::int64_t restarts = 0;          // sessions beyond the first heard of each service
+};
+
 class ServiceTally {
  public:
-  void Note(const fsmsg::service_state_t& state) {
-    missing_[{state.name, state.session}] = state.messages_missing;
-  }
+  // now_us: when the state arrived, by the clock that HeardSince() is asked in. States may come late or
+  // twice.
+  void Note(const fsmsg::service_state_t& state, std::int64_t now_us);
 
-  // Given up by any service in any of its sessions seen.
-  std::int64_t messages_missing() const;
-  // Sessions seen beyond the first of each service.
-  std::int64_t restarts() const;
+  ServiceSums Sums() const;
+  // Every service ever heard has been heard since then, or its last word was that it stops.
+  bool HeardSince(std::int64_t since_us) const;
 
  private:
-  std::map<std::pair<std::string, std::int64_t>, std::int64_t> missing_;  // by name and session
+  struct Service {
+    std::map<std::int64_t, std::int64_t> missing;  // by session
+    std::int64_t missing_before = 0;               // what it had given up when first heard
+    std::int64_t heard_us = 0;
+    bool stopping = false;
+  };
+  std::map<std::string, Service> services_;  // by name
 };
 
 }  // namespace forgescan

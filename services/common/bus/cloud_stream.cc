@@ -8,7 +8,8 @@
 namespace forgescan {
 namespace {
 
-static_assert(std::endian::native == std::endian::little, "the layout of a point is written for little-endian hosts");
+static_assert(std::endian::native == std::endian::little,
+              "the layout of a point is written for little-endian hosts");
 
 constexpr std::size_t kPointBytes = 30;
 constexpr std::size_t kSlicePoints = 4'000'000 / kPointBytes;
@@ -38,7 +39,8 @@ void Resize(PointCloud& cloud, std::size_t points) {
 }
 
 bool IsConsistent(const fsmsg::cloud_slice_t& slice) {
-  const auto total = static_cast<std::size_t>(slice.points_total), first = static_cast<std::size_t>(slice.first_point),
+  const auto total = static_cast<std::size_t>(slice.points_total),
+             first = static_cast<std::size_t>(slice.first_point),
              count = static_cast<std::size_t>(slice.points);
   return slice.points_total >= 0 && slice.first_point >= 0 && slice.points >= 0 && total <= kMaxPoints &&
          slice.slice >= 0 && slice.slice < slice.slice_count && first + count <= total &&
@@ -48,10 +50,12 @@ bool IsConsistent(const fsmsg::cloud_slice_t& slice) {
 
 }  // namespace
 
-Result<std::vector<fsmsg::cloud_slice_t>> SliceCloud(const PointCloud& cloud, std::int64_t utime, int part, int view) {
+Result<std::vector<fsmsg::cloud_slice_t>> SliceCloud(const PointCloud& cloud, std::int64_t utime, int part,
+                                                     int view) {
   const std::size_t total = cloud.size();
   if (cloud.normals.size() != total || cloud.sigma_mm.size() != total || cloud.view.size() != total) {
-    return Fail(ErrorCode::kInvalidArgument, "a cloud of {} points has {} normals, {} sigmas and {} view numbers", total,
+    return Fail(ErrorCode::kInvalidArgument,
+                "a cloud of {} points has {} normals, {} sigmas and {} view numbers", total,
                 cloud.normals.size(), cloud.sigma_mm.size(), cloud.view.size());
   }
   const std::size_t count = std::max<std::size_t>(1, (total + kSlicePoints - 1) / kSlicePoints);
@@ -76,38 +80,49 @@ Result<std::vector<fsmsg::cloud_slice_t>> SliceCloud(const PointCloud& cloud, st
   return slices;
 }
 
-Result<std::optional<PointCloud>> CloudAssembler::Add(const fsmsg::cloud_slice_t& slice) {
-  const std::pair key{slice.part, slice.view};
-  Open& open = open_[key];
-  if (IsConsistent(slice) && open.have.empty()) {
+CloudAssembler::Open& CloudAssembler::OpenFor(const fsmsg::cloud_slice_t& slice) {
+  const Key key{slice.part, slice.view, slice.utime};
+  if (open_.Find(key) == nullptr) {
+    Open open;
     Resize(open.cloud, static_cast<std::size_t>(slice.points_total));
     open.have.assign(static_cast<std::size_t>(slice.slice_count), false);
     open.missing = open.have.size();
+    open_.Insert(key, std::move(open));
   }
-  if (!IsConsistent(slice) || open.have.size() != static_cast<std::size_t>(slice.slice_count) ||
-      open.cloud.size() != static_cast<std::size_t>(slice.points_total)) {
-    open_.erase(key);
-    return Fail(ErrorCode::kFormat, "part {} view {}: slice {} of {} contradicts its cloud", slice.part, slice.view,
-                slice.slice, slice.slice_count);
+  return *open_.Find(key);
+}
+
+Result<std::optional<PointCloud>> CloudAssembler::Add(const fsmsg::cloud_slice_t& slice) {
+  const Key key{slice.part, slice.view, slice.utime};
+  Open* open = IsConsistent(slice) ? &OpenFor(slice) : nullptr;
+  if (open == nullptr || open->have.size() != static_cast<std::size_t>(slice.slice_count) ||
+      open->cloud.size() != static_cast<std::size_t>(slice.points_total)) {
+    open_.Take(key);
+    return Fail(ErrorCode::kFormat, "part {} view {}: slice {} of {} contradicts its cloud", slice.part,
+                slice.view, slice.slice, slice.slice_count);
   }
   const auto index = static_cast<std::size_t>(slice.slice);
-  if (!open.have[index]) {
-    open.have[index] = true;
-    --open.missing;
+  if (!open->have[index]) {
+    open->have[index] = true;
+    --open->missing;
     for (std::size_t i = 0; i < static_cast<std::size_t>(slice.points); ++i) {
-      Unpack(slice.data.data() + i * kPointBytes, static_cast<std::size_t>(slice.first_point) + i, open.cloud);
+      Unpack(slice.data.data() + i * kPointBytes, static_cast<std::size_t>(slice.first_point) + i,
+             open->cloud);
     }
   }
-  if (open.missing > 0) {
+  if (open->missing > 0) {
     return std::optional<PointCloud>();
   }
-  std::optional<PointCloud> cloud = std::move(open.cloud);
-  open_.erase(key);
-  return cloud;
+  return std::optional<PointCloud>(std::move(open_.Take(key)->cloud));
 }
 
 void CloudAssembler::Forget(int part) {
-  std::erase_if(open_, [part](const auto& open) { return open.first.first == part; });
+  open_.EraseIf([part](const Key& key) { return std::get<0>(key) == part; });
+}
+
+void CloudAssembler::Forget(int part, std::int64_t utime) {
+  open_.EraseIf(
+      [part, utime](const Key& key) { return std::get<0>(key) == part && std::get<2>(key) == utime; });
 }
 
 }  // namespace forgescan

@@ -1,8 +1,8 @@
-// Reliable, ordered streams of typed messages over a Bus that may lose, duplicate and reorder: sequence numbers, CRC-32,
-// resend on request, bounded give-up. One StreamHub a service; one sender a channel.
+// Reliable, ordered streams of typed messages over a Bus that may lose, duplicate and reorder: sequence
+// numbers, CRC-32, resend on request, bounded give-up. One StreamHub a service; one sender a channel.
 //
-// Why: LCM loses large messages in silence when a kernel buffer is too small or a process is away too long. With
-// net.core.rmem_max at 128 MB (sysctl) resends are rare; with Debian's defaults they carry everything.
+// Why: LCM loses large messages in silence when a kernel buffer is too small or a process is away too long.
+// With net.core.rmem_max at 128 MB (sysctl) resends are rare; with Debian's defaults they carry everything.
 #pragma once
 
 #include <map>
@@ -27,7 +27,8 @@ class StreamHub {
   std::int64_t session() const { return sender_.session(); }
   const StreamCounters& counters() const { return counters_; }
 
-  // Says at once that this service sends on the channel; so a receiver misses nothing from its first message on.
+  // Says at once that this service sends on the channel; so a receiver misses nothing from its first message
+  // on.
   template <typename Message>
   void Advertise(const Channel<Message>& channel) {
     sender_.Advertise(channel.name);
@@ -50,6 +51,13 @@ class StreamHub {
   void OnLost(const Channel<Message>& channel, StreamReceiver::LostHandler handler) {
     Receiver(channel.name).SetLostHandler(std::move(handler));
   }
+  // A message that the sender has announced is still to come, or to be given up. False for a channel never
+  // subscribed.
+  template <typename Message>
+  bool Waiting(const Channel<Message>& channel) const {
+    const auto found = receivers_.find(channel.name);
+    return found != receivers_.end() && found->second->waiting();
+  }
 
  private:
   StreamReceiver& Receiver(const std::string& channel);
@@ -69,7 +77,8 @@ Status PublishState(Bus& bus, const StateChannel<Message>& channel, const Messag
 }
 // What does not decode is left out: the sender says it again within a second.
 template <typename Message>
-void SubscribeState(Bus& bus, const StateChannel<Message>& channel, std::function<void(const Message&)> handler) {
+void SubscribeState(Bus& bus, const StateChannel<Message>& channel,
+                    std::function<void(const Message&)> handler) {
   bus.Subscribe(channel.name, [handler = std::move(handler)](ByteView bytes) {
     if (const Result<Message> message = Decode<Message>(bytes); message.ok()) {
       handler(*message);

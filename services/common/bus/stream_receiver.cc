@@ -14,6 +14,7 @@ namespace {
 // memory.
 constexpr std::int64_t kMaxWaiting = 100'000;
 constexpr std::size_t kMaxPiecesAsked = 2000;
+constexpr std::size_t kSessionsLeftKept = 8;  // their datagrams are milliseconds late, restarts seconds apart
 
 }  // namespace
 
@@ -26,19 +27,25 @@ StreamReceiver::StreamReceiver(Bus& bus, std::string channel, const StreamOption
       subscribed_us_(bus.NowUs()) {}
 
 bool StreamReceiver::EnterSession(std::int64_t session, std::int64_t first_sequence_if_joining) {
-  if (session >= session_) {
-    heard_us_ = bus_.NowUs();
+  if (std::find(left_.begin(), left_.end(), session) != left_.end()) {
+    return false;
   }
+  heard_us_ = bus_.NowUs();
   if (session == session_) {
     return true;
   }
-  if (session < session_) {
-    return false;
-  }
   // A sender that started after we subscribed is heard from its first message on; an older one from now on.
-  const bool from_the_start = session >= subscribed_us_;
+  // One that follows another has started meanwhile, even if its session is lower because the wall clock was
+  // set back.
+  const bool from_the_start = session_ != 0 || session >= subscribed_us_;
   if (!waiting_.empty()) {
     GiveUp(waiting_.rbegin()->first + 1);
+  }
+  if (session_ != 0) {
+    left_.push_back(session_);
+  }
+  if (left_.size() > kSessionsLeftKept) {
+    left_.pop_front();
   }
   session_ = session;
   next_ = from_the_start ? 1 : first_sequence_if_joining;

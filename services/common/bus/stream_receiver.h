@@ -8,6 +8,7 @@
 //                                                 +-----------> lost handler, then in order behind the hole
 #pragma once
 
+#include <deque>
 #include <functional>
 #include <map>
 #include <string>
@@ -50,7 +51,8 @@ class StreamReceiver {
     std::int64_t asked_us = 0;        // the last time
   };
 
-  // False: the bytes belong to an older session.
+  // Follows the sender into a new session, whichever is the higher. False: the bytes belong to one that was
+  // left.
   bool EnterSession(std::int64_t session, std::int64_t first_sequence_if_joining);
   void NoteUpTo(std::int64_t last);
   void Complete(Waiting& waiting, ByteView bytes);
@@ -66,9 +68,10 @@ class StreamReceiver {
   Handler handler_;
   LostHandler lost_handler_;
   std::int64_t subscribed_us_;
-  std::int64_t session_ = 0;   // 0 = no contact yet
-  std::int64_t next_ = 1;      // sequence to be delivered next
-  std::int64_t heard_us_ = 0;  // last sign of life of the sender
+  std::int64_t session_ = 0;       // 0 = no contact yet
+  std::deque<std::int64_t> left_;  // the last sessions before it, oldest first; never entered again
+  std::int64_t next_ = 1;          // sequence to be delivered next
+  std::int64_t heard_us_ = 0;      // last sign of life of the sender
   std::map<std::int64_t, Waiting> waiting_;
 };
 

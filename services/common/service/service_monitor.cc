@@ -8,16 +8,25 @@ namespace forgescan {
 namespace {
 
 constexpr std::int64_t kPeriodUs = 1'000'000;
+constexpr std::int64_t kLossPeriodUs = 10'000;  // as often as the streams look for what is overdue
 
 }  // namespace
 
 ServiceMonitor::ServiceMonitor(StreamHub& hub, std::string name, std::string config_hash)
     : hub_(hub), name_(std::move(name)), config_hash_(std::move(config_hash)) {
   timer_ = hub_.bus().Every(kPeriodUs, [this] { Publish(); });
+  loss_timer_ = hub_.bus().Every(kLossPeriodUs, [this] {
+    if (hub_.counters().missing != missing_told_) {
+      Publish();
+    }
+  });
   Publish();
 }
 
-ServiceMonitor::~ServiceMonitor() { hub_.bus().Cancel(timer_); }
+ServiceMonitor::~ServiceMonitor() {
+  hub_.bus().Cancel(timer_);
+  hub_.bus().Cancel(loss_timer_);
+}
 
 std::int64_t ServiceMonitor::counter(const std::string& name) const {
   const auto found = counters_.find(name);
@@ -55,7 +64,7 @@ void ServiceMonitor::Publish() {
   state.last_error = last_error_;
   state.receive_buffer_bytes = health.receive_buffer_bytes;
   state.socket_drops = health.socket_drops;
-  state.messages_missing = streams.missing;
+  state.messages_missing = missing_told_ = streams.missing;
   state.messages_resent = streams.resent;
   state.messages_recovered = streams.recovered;
   state.decode_errors = streams.damaged;

@@ -1,5 +1,5 @@
-// What a service says of itself on SERVICE_STATE: once a second and at every change, from its working loop, so that a hung
-// loop goes silent.
+// What a service says of itself on SERVICE_STATE: once a second, at every change and at every message given
+// up, from its working loop, so that a hung loop goes silent.
 #pragma once
 
 #include <cstdint>
@@ -33,7 +33,8 @@ class ServiceMonitor {
   std::int64_t counter(const std::string& name) const;
 
   void SetState(ServiceState state, const std::string& text);
-  // Keeps the sentence as last error, writes it to the log and counts it under `errors`; the state stays as it is.
+  // Keeps the sentence as last error, writes it to the log and counts it under `errors`; the state stays as
+  // it is.
   void ReportError(const Error& error);
   void SetCounter(const std::string& name, std::int64_t value) { counters_[name] = value; }
   void Count(const std::string& name, std::int64_t by = 1) { counters_[name] += by; }
@@ -48,7 +49,9 @@ class ServiceMonitor {
   std::string text_;
   std::string last_error_;
   std::map<std::string, std::int64_t> counters_;
+  std::int64_t missing_told_ = 0;  // messages given up, as last published
   Bus::TimerId timer_;
+  Bus::TimerId loss_timer_;
 };
 
 }  // namespace forgescan

@@ -57,6 +57,53 @@ TEST(CloudStream, TwoCloudsMayInterleave) {
   EXPECT_EQ((*assembler.Add(b[1]))->size(), 150'000u);
 }
 
+TEST(CloudStream, TwoAttemptsAtAViewAreTwoClouds) {
+  const auto first = *SliceCloud(MakeCloud(200'000), 1, 1, 0),
+             second = *SliceCloud(MakeCloud(200'000), 2, 1, 0);
+  CloudAssembler assembler;
+  EXPECT_FALSE((*assembler.Add(first[0])).has_value());
+  EXPECT_FALSE((*assembler.Add(second[1])).has_value()) << "half of each is no cloud";
+  EXPECT_TRUE((*assembler.Add(second[0])).has_value());
+  EXPECT_TRUE((*assembler.Add(first[1])).has_value());
+}
+
+TEST(CloudStream, AnotherSizeAtTheSameViewIsNoContradictionOfTheLastAttempt) {
+  const auto first = *SliceCloud(MakeCloud(200'000), 1, 1, 0),
+             second = *SliceCloud(MakeCloud(150'000), 2, 1, 0);
+  CloudAssembler assembler;
+  EXPECT_FALSE((*assembler.Add(first[0])).has_value());
+  EXPECT_TRUE(assembler.Add(second[0]).ok());
+  EXPECT_EQ((*assembler.Add(second[1]))->size(), 150'000u);
+}
+
+TEST(CloudStream, TheOldestOpenCloudMakesRoom) {
+  const auto slices = *SliceCloud(MakeCloud(150'000), 0, 1, 0);
+  const auto of = [&slices](std::int64_t utime, std::size_t k) {
+    auto slice = slices[k];
+    slice.utime = utime;
+    return slice;
+  };
+  CloudAssembler assembler;
+  const auto count = static_cast<std::int64_t>(CloudAssembler::kMaxOpen);
+  for (std::int64_t utime = 0; utime <= count; ++utime) {
+    EXPECT_FALSE((*assembler.Add(of(utime, 0))).has_value());
+  }
+  for (std::int64_t utime = 1; utime <= count; ++utime) {
+    EXPECT_TRUE((*assembler.Add(of(utime, 1))).has_value()) << utime;
+  }
+  EXPECT_FALSE((*assembler.Add(of(0, 1))).has_value()) << "its first half is gone";
+}
+
+TEST(CloudStream, ForgetsAllCloudsOfAPart) {
+  const auto a = *SliceCloud(MakeCloud(200'000), 1, 1, 0), b = *SliceCloud(MakeCloud(200'000), 1, 2, 0);
+  CloudAssembler assembler;
+  EXPECT_FALSE((*assembler.Add(a[0])).has_value());
+  EXPECT_FALSE((*assembler.Add(b[0])).has_value());
+  assembler.Forget(1);
+  EXPECT_FALSE((*assembler.Add(a[1])).has_value());
+  EXPECT_TRUE((*assembler.Add(b[1])).has_value());
+}
+
 TEST(CloudStream, ContradictionsAreErrorsAndTheNextCloudWorks) {
   const auto good = SliceCloud(MakeCloud(10), 1, 1, 0)->front();
   CloudAssembler assembler;

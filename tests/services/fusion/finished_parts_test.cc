@@ -39,7 +39,7 @@ class FinishedPartsTest : public ::testing::Test {
   Message Of(int part) const {
     Message message{};
     message.part = part;
-    message.utime = network_.NowUs();
+    message.utime = network_.NowUs() + step_us_;
     return message;
   }
   void Arrive(int part) {
@@ -65,7 +65,7 @@ class FinishedPartsTest : public ::testing::Test {
     cloud.normals.assign(5, Eigen::Vector3f::UnitZ());
     cloud.sigma_mm.assign(5, 0.01F);
     cloud.view.assign(5, 0);
-    for (const auto& slice : *SliceCloud(cloud, network_.NowUs(), part, 0)) {
+    for (const auto& slice : *SliceCloud(cloud, network_.NowUs() + step_us_, part, 0)) {
       ASSERT_TRUE(sender_.Publish(kViewCloud, slice).ok());
     }
     auto result = Of<fsmsg::view_result_t>(part);
@@ -88,6 +88,7 @@ class FinishedPartsTest : public ::testing::Test {
     End(part);
   }
 
+  std::int64_t step_us_ = 0;  // of the clock the messages are stamped by
   SimNetwork network_;
   StreamHub hub_{network_.AddNode(), "fusion"};
   StreamHub sender_{network_.AddNode(), "sender"};
@@ -115,6 +116,53 @@ TEST_F(FinishedPartsTest, TheSameNumberThatArrivesAgainIsAnotherPart) {
     ASSERT_EQ(results_.size(), i);
     EXPECT_EQ(results_.back().status, fsmsg::view_result_t::STATUS_OK);
   }
+}
+
+TEST_F(FinishedPartsTest, AClockSetBackMakesNoDifferenceToThat) {
+  Start();
+  Part(1);
+  step_us_ = -3600 * kSecondUs;
+  Part(1);
+  ASSERT_EQ(results_.size(), 2U);
+  EXPECT_EQ(results_.back().status, fsmsg::view_result_t::STATUS_OK);
+}
+
+TEST_F(FinishedPartsTest, AnUnfinishedPartLeavesNothingToTheNextWithItsNumber) {
+  Start();
+  Arrive(1);
+  View(1);
+  Arrive(1);  // the line was started anew
+  End(1);
+  EXPECT_TRUE(results_.empty()) << "the view of the earlier part is not this one's";
+  View(1);
+  ASSERT_EQ(results_.size(), 1U);
+  EXPECT_EQ(results_[0].status, fsmsg::view_result_t::STATUS_OK);
+  EXPECT_THAT(monitor_.last_error(), HasSubstr("part 1 never finished"));
+}
+
+TEST_F(FinishedPartsTest, NewsOfTheEarlierPartAreNotTheNextOnes) {
+  Start();
+  Arrive(1);
+  network_.RunFor(30 * kSecondUs);
+  Arrive(1);
+  step_us_ = -10 * kSecondUs;  // taken while the earlier one was in place
+  View(1);
+  End(1);
+  EXPECT_EQ(monitor_.counter("messages_late"), 4);
+  step_us_ = 0;
+  View(1);
+  End(1);
+  ASSERT_EQ(results_.size(), 1U);
+  EXPECT_EQ(results_[0].utime, network_.NowUs() - kSecondUs);
+}
+
+TEST_F(FinishedPartsTest, AnEarlierPartWhoseArrivalWasNotSeenIsDroppedToo) {
+  Start();
+  View(1);
+  Part(1);
+  ASSERT_EQ(results_.size(), 1U);
+  EXPECT_EQ(results_[0].status, fsmsg::view_result_t::STATUS_OK);
+  EXPECT_THAT(monitor_.last_error(), HasSubstr("part 1 never finished"));
 }
 
 TEST_F(FinishedPartsTest, ABodyThatIsNotAsWarmAsAtTheTeachingIsNamed) {

@@ -14,6 +14,7 @@ using ::testing::HasSubstr;
 
 constexpr std::uint32_t kPathCrc = 0xfedcba98;
 constexpr std::int64_t kSecondUs = 1'000'000;
+constexpr std::int64_t kViewUtime = 1;
 
 // The fusion service of a two-view station, and the senders around it.
 class FusionServiceTest : public ::testing::Test {
@@ -45,15 +46,22 @@ class FusionServiceTest : public ::testing::Test {
     ASSERT_TRUE(sender_.Publish(kPartArrived, arrived).ok());
   }
   void Cloud(int part, int view, std::size_t points) {
+    Slices(part, view, points, kViewUtime);
+    Result(part, view, points, kViewUtime);
+  }
+  void Slices(int part, int view, std::size_t points, std::int64_t utime) {
     PointCloud cloud;
     cloud.points.assign(points, Eigen::Vector3f(1, 2, 3));
     cloud.normals.assign(points, Eigen::Vector3f::UnitZ());
     cloud.sigma_mm.assign(points, 0.01F);
     cloud.view.assign(points, static_cast<std::uint16_t>(view));
-    for (const auto& slice : *SliceCloud(cloud, 1, part, view)) {
+    for (const auto& slice : *SliceCloud(cloud, utime, part, view)) {
       ASSERT_TRUE(sender_.Publish(kViewCloud, slice).ok());
     }
+  }
+  void Result(int part, int view, std::size_t points, std::int64_t utime) {
     fsmsg::view_result_t result{};
+    result.utime = utime;
     result.part = part;
     result.view = view;
     result.status = fsmsg::view_result_t::STATUS_OK;
@@ -161,6 +169,22 @@ TEST_F(FusionServiceTest, ALateViewIsNamedAndThePartIsVoid) {
   network_.RunFor(kSecondUs);
   ASSERT_EQ(results_.size(), 2u);
   EXPECT_EQ(results_[1].status, fsmsg::view_result_t::STATUS_OK);
+}
+
+TEST_F(FusionServiceTest, ACloudOfAnotherAttemptIsNotTheResultsOwn) {
+  Arrive(1);
+  Cloud(1, 0, 5);
+  Slices(1, 1, 5, kViewUtime);
+  Result(1, 1, 5, kViewUtime + 1);  // as many points, but of the next attempt
+  Temperature(1, 0, 900);
+  Temperature(1, 1, 900);
+  ScanComplete(1);
+  network_.RunFor(kSecondUs);
+  EXPECT_TRUE(results_.empty());
+  Slices(1, 1, 5, kViewUtime + 1);
+  network_.RunFor(kSecondUs);
+  ASSERT_EQ(results_.size(), 1u);
+  EXPECT_EQ(results_[0].status, fsmsg::view_result_t::STATUS_OK);
 }
 
 TEST_F(FusionServiceTest, AnAbortedScanEndsAtOnce) {

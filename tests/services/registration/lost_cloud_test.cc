@@ -15,6 +15,7 @@ namespace {
 using ::testing::HasSubstr;
 
 constexpr std::int64_t kSecondUs = 1'000'000;
+constexpr std::int64_t kFirst = 1000, kSecond = 2000;  // ends of two scans
 
 class LostCloudTest : public ::testing::Test {
  protected:
@@ -26,26 +27,30 @@ class LostCloudTest : public ::testing::Test {
                                                [this](const auto& message) { results_.push_back(message); });
     network_.RunFor(kSecondUs);
   }
-  void Fused(int part) {
+  void Fused(int part, std::int64_t utime) {
     fsmsg::fusion_result_t result{};
-    result.utime = network_.NowUs();
+    result.utime = utime;
     result.part = part;
     result.status = fsmsg::view_result_t::STATUS_OK;
     ASSERT_TRUE(fusion_.Publish(kFusionResult, result).ok());
   }
   // Two slices, of which the first `sent` are published.
-  void Slices(int part, std::size_t sent) {
+  void Slices(int part, std::size_t sent, std::int64_t utime) {
+    for (std::size_t i = 0; i < sent; ++i) {
+      ASSERT_TRUE(fusion_.Publish(kFusedCloud, TwoSlices(part, utime)[i]).ok());
+    }
+  }
+  void SecondSlice(int part, std::int64_t utime) {
+    ASSERT_TRUE(fusion_.Publish(kFusedCloud, TwoSlices(part, utime)[1]).ok());
+  }
+  static std::vector<fsmsg::cloud_slice_t> TwoSlices(int part, std::int64_t utime) {
     constexpr std::size_t kPoints = 150'000;
     PointCloud cloud;
     cloud.points.assign(kPoints, Eigen::Vector3f(1, 2, 3));
     cloud.normals.assign(kPoints, Eigen::Vector3f::UnitZ());
     cloud.sigma_mm.assign(kPoints, 0.01F);
     cloud.view.assign(kPoints, 0);
-    const auto slices = SliceCloud(cloud, 1, part, kAllViews).value();
-    ASSERT_EQ(slices.size(), 2U);
-    for (std::size_t i = 0; i < sent; ++i) {
-      ASSERT_TRUE(fusion_.Publish(kFusedCloud, slices[i]).ok());
-    }
+    return SliceCloud(cloud, utime, part, kAllViews).value();
   }
 
   SimNetwork network_;
@@ -58,8 +63,8 @@ class LostCloudTest : public ::testing::Test {
 };
 
 TEST_F(LostCloudTest, HalfACloudFailsAfterItsTimeout) {
-  Slices(1, 1);
-  Fused(1);
+  Slices(1, 1, kFirst);
+  Fused(1, kFirst);
   network_.RunFor(10 * kSecondUs);
   EXPECT_TRUE(results_.empty());
   network_.RunFor(10 * kSecondUs);  // the timeout is 15 s
@@ -70,22 +75,50 @@ TEST_F(LostCloudTest, HalfACloudFailsAfterItsTimeout) {
 }
 
 TEST_F(LostCloudTest, AWholeCloudIsNotGivenUp) {
-  Fused(1);
+  Fused(1, kFirst);
   network_.RunFor(5 * kSecondUs);
-  Slices(1, 2);
+  Slices(1, 2, kFirst);
   network_.RunFor(30 * kSecondUs);
   ASSERT_EQ(results_.size(), 1U);  // and fails for what it is: one point, 150 000 times
   EXPECT_THAT(results_[0].reason, ::testing::Not(HasSubstr("not whole")));
 }
 
 TEST_F(LostCloudTest, ThePartNumberMayComeAgain) {
-  Fused(1);
+  Fused(1, kFirst);
   network_.RunFor(20 * kSecondUs);
-  Fused(1);
+  Fused(1, kSecond);
   network_.RunFor(10 * kSecondUs);
   EXPECT_EQ(results_.size(), 1U);
   network_.RunFor(10 * kSecondUs);
   EXPECT_EQ(results_.size(), 2U);
+}
+
+TEST_F(LostCloudTest, TheCloudOfAnEarlierPartWithTheNumberIsNotUsed) {
+  Slices(1, 2, kFirst);  // and its result never comes
+  network_.RunFor(5 * kSecondUs);
+  Fused(1, kSecond);
+  network_.RunFor(5 * kSecondUs);
+  EXPECT_TRUE(results_.empty());
+  Slices(1, 2, kSecond);
+  network_.RunFor(kSecondUs);
+  ASSERT_EQ(results_.size(), 1U);
+  EXPECT_EQ(results_[0].utime, kSecond);
+  EXPECT_THAT(results_[0].reason, ::testing::Not(HasSubstr("not whole")));
+}
+
+TEST_F(LostCloudTest, GivingUpTheEarlierPartLeavesTheLaterItsSlices) {
+  Slices(1, 1, kFirst);
+  Fused(1, kFirst);
+  network_.RunFor(14 * kSecondUs);
+  Slices(1, 1, kSecond);
+  Fused(1, kSecond);
+  network_.RunFor(5 * kSecondUs);
+  ASSERT_EQ(results_.size(), 1U);
+  EXPECT_EQ(results_[0].utime, kFirst);
+  SecondSlice(1, kSecond);
+  network_.RunFor(kSecondUs);
+  ASSERT_EQ(results_.size(), 2U);
+  EXPECT_THAT(results_[1].reason, ::testing::Not(HasSubstr("not whole")));
 }
 
 TEST(RegistrationConfigRange, AStartBeyondWhatTheRegistrationAllowsIsRefusedByItsKey) {

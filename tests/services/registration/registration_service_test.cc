@@ -21,6 +21,7 @@ using testing::ScanOf;
 using Message = fsmsg::registration_t;
 
 constexpr std::int64_t kSecondUs = 1'000'000;
+constexpr std::int64_t kScanEndUtime = 4242;
 constexpr std::size_t kPoints = 20'000;
 constexpr double kForeignShare = 0.22;
 
@@ -59,13 +60,13 @@ class RegistrationServiceTest : public ::testing::Test {
     return cloud;
   }
   void Cloud(int part, const PointCloud& cloud_in_array) {
-    for (const auto& slice : *SliceCloud(cloud_in_array, 1, part, kAllViews)) {
+    for (const auto& slice : *SliceCloud(cloud_in_array, kScanEndUtime, part, kAllViews)) {
       ASSERT_TRUE(fusion_.Publish(kFusedCloud, slice).ok());
     }
   }
   void Fused(int part, std::size_t points, const std::string& reason = "") {
     fsmsg::fusion_result_t result{};
-    result.utime = 4242;
+    result.utime = kScanEndUtime;
     result.part = part;
     result.status = reason.empty() ? fsmsg::view_result_t::STATUS_OK : fsmsg::view_result_t::STATUS_VOID;
     result.reason = reason;
@@ -108,7 +109,7 @@ TEST_F(RegistrationServiceTest, FindsThePoseAndTakesForeignPointsOut) {
   ASSERT_EQ(results_.size(), 1u);
   ExpectPose(results_[0], 1);
   EXPECT_EQ(results_[0].part, 5);
-  EXPECT_EQ(results_[0].utime, 4242);
+  EXPECT_EQ(results_[0].utime, kScanEndUtime);
   EXPECT_EQ(results_[0].reference_degc, 900);
   EXPECT_TRUE(results_[0].reason.empty());
   EXPECT_NEAR(results_[0].rms_mm, 0.03, 0.006);  // mm: the noise; the biweight takes a little off it

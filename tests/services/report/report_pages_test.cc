@@ -68,6 +68,7 @@ TEST(ReportJson, TellsTheNumbersAndNullForWhatIsNotKnown) {
   const json empty = json::parse(ReportJson(PartReport{}));
   EXPECT_TRUE(empty["registration"]["model_from_array"].is_null());
   EXPECT_TRUE(empty["timing_s"]["scan"].is_null());
+  EXPECT_TRUE(empty["counters"]["frames_lost"].is_null());
 }
 
 TEST(ReportJson, SurvivesTextThatIsNotUtf8) {

@@ -129,6 +129,7 @@ class ReportServiceTest : public ::testing::Test {
   void SendDuration(const Channel<fsmsg::processing_time_t>& channel, const char* step, int part,
                     std::int64_t us) {
     fsmsg::processing_time_t message{};
+    message.utime = Fusion(part).utime;
     message.part = part;
     message.step = step;
     message.duration_us = us;

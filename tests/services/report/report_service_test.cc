@@ -148,23 +148,6 @@ TEST_F(ReportServiceTest, AnEmptyCloudIsNotInspectedAndANumberMayComeAgain) {
   EXPECT_EQ(verdicts_.size(), 3u) << "part 1, part 1 again, part 2";
 }
 
-TEST_F(ReportServiceTest, CountsLossesAndRestartsOfAllServices) {
-  fsmsg::service_state_t state{};
-  for (const auto& [name, session, missing] :
-       {std::tuple("camera_left", 1, 2), std::tuple("camera_left", 1, 3), std::tuple("camera_left", 2, 1),
-        std::tuple("fusion", 1, 0)}) {
-    state.name = name;
-    state.session = session;
-    state.messages_missing = missing;
-    ASSERT_TRUE(PublishState(line_.bus(), kServiceState, state).ok());
-  }
-  SendGood(1);
-  network_.RunFor(3 * kSecondUs);
-  ASSERT_EQ(verdicts_.size(), 1u);
-  EXPECT_EQ(ReadJson(verdicts_[0])["counters"]["messages_missing"], 4);
-  EXPECT_EQ(ReadJson(verdicts_[0])["counters"]["restarts"], 1);
-}
-
 TEST_F(ReportServiceTest, ResultsThatCannotBeWrittenDoNotKeepTheVerdictFromTheLine) {
   std::ofstream(folder_ / ReportFolderName(1, Registration(1, 0).utime))
       << "a file where the folder should be";

@@ -44,6 +44,10 @@ class AgedMap {
     entries_.erase(found);
     return taken;
   }
+  template <typename Condition>
+  void EraseIf(Condition condition) {
+    std::erase_if(entries_, [&](const Entry& entry) { return condition(entry.first); });
+  }
 
  private:
   auto Position(const Key& key) {

@@ -1,0 +1,102 @@
+// A line that counts from the beginning again: the same number is another part, and nothing of the earlier
+// one gets into its report.
+#include "services/report/report_service.h"
+#include "tests/services/report/report_service_fixture.h"
+
+namespace forgescan {
+namespace {
+
+constexpr std::int64_t kLaterUs = 100 * kSecondUs;
+
+class ReportSameNumberTest : public ReportServiceTest {
+ protected:
+  // Messages of part 1, of a run of the line that began so much later than the first.
+  void ArriveAgain(std::int64_t later_us) {
+    fsmsg::part_arrived_t message{};
+    message.utime = Fusion(1).scan_start_utime + later_us;
+    message.part = 1;
+    ASSERT_TRUE(line_.Publish(kPartArrived, message).ok());
+    network_.RunFor(1000);
+  }
+  void MeasureAgain(std::int64_t later_us) {
+    fsmsg::fusion_result_t fusion = Fusion(1);
+    fusion.utime += later_us;
+    fusion.scan_start_utime += later_us;
+    ASSERT_TRUE(line_.Publish(kFusionResult, fusion).ok());
+    for (const auto& slice : SliceCloud(cloud_, fusion.utime, 1, kAllViews).value()) {
+      ASSERT_TRUE(line_.Publish(kRegisteredCloud, slice).ok());
+    }
+    fsmsg::registration_t registration = Registration(1, fsmsg::registration_t::STATUS_CONVERGED);
+    registration.utime = fusion.utime;
+    registration.points = static_cast<std::int32_t>(cloud_.size());
+    ASSERT_TRUE(line_.Publish(kRegistration, registration).ok());
+    network_.RunFor(1000);
+  }
+};
+
+TEST_F(ReportSameNumberTest, AnUnfinishedPartGetsItsVerdictAndLeavesNothingBehind) {
+  Arrive(1);
+  ASSERT_TRUE(line_.Publish(kFusionResult, Fusion(1)).ok());
+  network_.RunFor(kSecondUs);
+  ArriveAgain(kLaterUs);
+  ASSERT_EQ(verdicts_.size(), 1u);
+  EXPECT_EQ(verdicts_[0].verdict, fsmsg::verdict_t::VERDICT_NOT_INSPECTED);
+  SendCloud(1);  // late, of the earlier part
+  SendRegistration(1, fsmsg::registration_t::STATUS_FAILED);
+  network_.RunFor(kSecondUs);
+  EXPECT_EQ(verdicts_.size(), 1u);
+  MeasureAgain(kLaterUs);
+  ASSERT_EQ(verdicts_.size(), 2u);
+  EXPECT_EQ(verdicts_[1].verdict, fsmsg::verdict_t::VERDICT_OK) << verdicts_[1].reason;
+  EXPECT_EQ(verdicts_[1].utime, Fusion(1).utime + kLaterUs);
+}
+
+TEST_F(ReportSameNumberTest, AFinishedPartIsFollowedByAnotherAlsoOnAClockSetBack) {
+  SendGood(1);
+  network_.RunFor(kSecondUs);
+  for (const std::int64_t later_us : {kLaterUs, -3600 * kSecondUs}) {
+    const std::size_t before = verdicts_.size();
+    ArriveAgain(later_us);
+    MeasureAgain(later_us);
+    ASSERT_EQ(verdicts_.size(), before + 1);
+    EXPECT_EQ(verdicts_.back().verdict, fsmsg::verdict_t::VERDICT_OK) << verdicts_.back().reason;
+    EXPECT_EQ(verdicts_.back().utime, Fusion(1).utime + later_us);
+  }
+}
+
+TEST_F(ReportSameNumberTest, APartWhoseArrivalWasNotSeenIsNotJoinedWithTheNext) {
+  ASSERT_TRUE(line_.Publish(kFusionResult, Fusion(1)).ok());
+  network_.RunFor(kSecondUs);
+  ArriveAgain(kLaterUs);
+  ASSERT_EQ(verdicts_.size(), 1u);
+  EXPECT_EQ(verdicts_[0].verdict, fsmsg::verdict_t::VERDICT_NOT_INSPECTED);
+  MeasureAgain(kLaterUs);
+  ASSERT_EQ(verdicts_.size(), 2u);
+  EXPECT_EQ(ReadJson(verdicts_[1])["arrived_utime"], Fusion(1).scan_start_utime + kLaterUs);
+}
+
+TEST_F(ReportSameNumberTest, AnArrivalThatComesLateIsStillThePartsOwn) {
+  ASSERT_TRUE(line_.Publish(kFusionResult, Fusion(1)).ok());
+  network_.RunFor(kSecondUs);
+  Arrive(1);
+  network_.RunFor(1000);
+  EXPECT_TRUE(verdicts_.empty());
+  MeasureAgain(0);
+  ASSERT_EQ(verdicts_.size(), 1u);
+  EXPECT_EQ(verdicts_[0].verdict, fsmsg::verdict_t::VERDICT_OK) << verdicts_[0].reason;
+}
+
+TEST_F(ReportSameNumberTest, DurationsGoToThePartTheyAreOf) {
+  SendGood(1);
+  network_.RunFor(1000);
+  ArriveAgain(kLaterUs);
+  SendDuration(kFusionTime, "fusion", 1, 80'000);  // of the earlier part, whose page is still due
+  MeasureAgain(kLaterUs);
+  network_.RunFor(3 * kSecondUs);
+  ASSERT_EQ(verdicts_.size(), 2u);
+  EXPECT_EQ(ReadJson(verdicts_[0])["timing_s"]["fusion"], 0.08);
+  EXPECT_TRUE(ReadJson(verdicts_[1])["timing_s"]["fusion"].is_null());
+}
+
+}  // namespace
+}  // namespace forgescan
