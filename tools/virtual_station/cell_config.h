@@ -44,6 +44,14 @@ struct CalibrationErrorConfig {
   double rotation_sd_rad, translation_sd_mm;
 };
 
+// Relative errors of what the station's files say of light, cameras and steel, standard deviations.
+struct CommissioningErrorConfig {
+  double contrast_sd;         // of each contrast of the pattern
+  double noise_sd;            // of the cameras' read noise, and of their gain
+  double expansion_sd;        // of the whole expansion curve: the sample is of another heat of the steel
+  double expansion_point_sd;  // of each point of it, absolute
+};
+
 struct ProjectorLightConfig {
   double mean_level, amplitude;  // of the sinusoid, fractions of full projector drive; white is 1
   double second_harmonic_ratio;  // second over first harmonic left after linearisation
@@ -92,6 +100,7 @@ struct CellConfig {
   HeatConfig heat;
   RobotScatter robot;
   CalibrationErrorConfig calibration_error;
+  CommissioningErrorConfig commissioning_error;
   ProjectorLightConfig projector_light;
   SensorConfig sensor;
   SurfaceConfig surface;
