@@ -80,12 +80,11 @@ Result<const RenderedView*> RenderedCell::View(int part, int view) {
 
 Result<std::map<std::string, double>> RenderedCell::TrueSizesMm(int part) const {
   ASSIGN_OR_RETURN(const PartState state, cell_->cell.Part(part));
-  const AxleSize& size = state.size;
-  return std::map<std::string, double>{{"total_length", size.total_length_mm},
-                                       {"left_plate_width", size.left_plate_width_mm},
-                                       {"right_plate_width", size.right_plate_width_mm},
-                                       {"left_cylinder_diameter", size.left_cylinder_diameter_mm},
-                                       {"right_cylinder_diameter", size.right_cylinder_diameter_mm}};
+  std::map<std::string, double> sizes_mm;
+  for (const AxleDimension& dimension : kAxleDimensions) {
+    sizes_mm[dimension.name] = state.size.*dimension.size_mm;
+  }
+  return sizes_mm;
 }
 
 }  // namespace forgescan::testing

@@ -107,22 +107,10 @@ Result<std::vector<BoxConfig>> ReadBoxes(const CellFile& file) {
 
 // Every section is known, and `seed` is the only key outside them.
 Status CheckSections(const CellFile& file) {
-  const std::set<std::string> known = {"seed",
-                                       "image",
-                                       "rig",
-                                       "camera_left",
-                                       "camera_right",
-                                       "projector",
-                                       "part",
-                                       "heat",
-                                       "robot",
-                                       "calibration_error",
-                                       "commissioning_error",
-                                       "projector_light",
-                                       "sensor",
-                                       "surface",
-                                       "view",
-                                       "box"};
+  const std::set<std::string> known = {
+      "seed",     "image", "rig",   "camera_left",       "camera_right",        "projector",       "part",
+      "odd_part", "heat",  "robot", "calibration_error", "commissioning_error", "projector_light", "sensor",
+      "surface",  "view",  "box"};
   for (const auto& [key, node] : file.root) {
     if (!known.contains(std::string(key.str()))) {
       return Fail(ErrorCode::kFormat, "{}: {} is not a section or key of the virtual cell", file.path,

@@ -13,6 +13,13 @@
 
 namespace forgescan {
 
+// A part one size of which went wrong, whatever scatter and wear would have made of it.
+struct OddPart {
+  int part;
+  double AxleSize::*size_mm;  // which
+  double mm;
+};
+
 struct PartConfig {
   AxleSize nominal;
   double length_sd_mm, plate_sd_mm, cylinder_sd_mm;          // from part to part
@@ -21,6 +28,7 @@ struct PartConfig {
   double rotation_scatter_deg;                               // uniform +- about each axis
   double length_tolerance_mm, plate_tolerance_mm,
       cylinder_tolerance_mm;  // +- about nominal, for features.toml
+  std::vector<OddPart> odd_parts;
 };
 
 struct HeatConfig {

@@ -1,5 +1,6 @@
 #include "tools/virtual_station/cell_sections.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace forgescan {
@@ -20,6 +21,40 @@ Result<std::vector<const toml::table*>> CellFile::Tables(const std::string& name
   return tables;
 }
 
+namespace {
+
+// Errors: also kFormat for a size that is none of the axle's, or not one it can have.
+Result<std::vector<OddPart>> ReadOddParts(const CellFile& file) {
+  if (!file.root.contains("odd_part")) {
+    return std::vector<OddPart>();
+  }
+  ASSIGN_OR_RETURN(const auto tables, file.Tables("odd_part"));
+  std::vector<OddPart> parts;
+  for (const toml::table* table : tables) {
+    const std::string place = fmt::format("{} [[odd_part]] {}", file.path, parts.size());
+    TomlSection s(table, place);
+    OddPart part{s.Integer("part", {0, 1e6}), nullptr, 0.0};
+    const std::string name = s.Text("dimension");
+    part.mm = s.Number("size_mm", {0, 10000});
+    RETURN_IF_ERROR(s.Finish());
+    const auto found = std::find_if(kAxleDimensions.begin(), kAxleDimensions.end(),
+                                    [&](const AxleDimension& dimension) { return name == dimension.name; });
+    if (found == kAxleDimensions.end()) {
+      return Fail(ErrorCode::kFormat, "{}: dimension '{}' is none of the axle", place, name);
+    }
+    part.size_mm = found->size_mm;
+    AxleSize size;
+    size.*part.size_mm = part.mm;
+    if (const Status possible = Check(size); !possible.ok()) {
+      return Fail(ErrorCode::kFormat, "{}: {}", place, possible.error().message);
+    }
+    parts.push_back(part);
+  }
+  return parts;
+}
+
+}  // namespace
+
 Result<PartConfig> ReadPart(const CellFile& file) {
   TomlSection s = file.Section("part");
   PartConfig part{};
@@ -39,6 +74,7 @@ Result<PartConfig> ReadPart(const CellFile& file) {
   part.plate_tolerance_mm = s.Number("plate_tolerance_mm", {0.01, 20});
   part.cylinder_tolerance_mm = s.Number("cylinder_tolerance_mm", {0.01, 20});
   RETURN_IF_ERROR(s.Finish());
+  ASSIGN_OR_RETURN(part.odd_parts, ReadOddParts(file));
   return part;
 }
 

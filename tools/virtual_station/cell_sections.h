@@ -19,6 +19,7 @@ struct CellFile {
   Result<std::vector<const toml::table*>> Tables(const std::string& name) const;
 };
 
+// [part] and every [[odd_part]].
 Result<PartConfig> ReadPart(const CellFile& file);
 Result<HeatConfig> ReadHeat(const CellFile& file);
 Result<RobotScatter> ReadRobot(const CellFile& file);
