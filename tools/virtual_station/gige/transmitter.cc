@@ -93,12 +93,12 @@ TransmitterCounters Transmitter::counters() const {
 void Transmitter::Run() {
   std::unique_lock lock(mutex_);
   while (!stop_) {
-    if (!resends_.empty()) {
-      ServeResend();
-    } else if (!active_ && !StartFrame()) {
+    if (resends_.empty() && !active_ && !StartFrame()) {
       wake_.wait(lock);
     } else if (port_free_ns_ > MonoNowNs()) {
       wake_.wait_until(lock, MonoTimePoint(port_free_ns_));
+    } else if (!resends_.empty()) {
+      ServeResend();
     } else {
       SendSome();
     }
@@ -138,7 +138,7 @@ void Transmitter::SendSome() {
   }
 }
 
-// Resends go before what waits; they take their time on the wire like everything else.
+// Resends go before what waits, at the pace of the wire like everything else.
 void Transmitter::ServeResend() {
   ResendRequest& request = resends_.front();
   const auto found = std::find_if(history_.begin(), history_.end(),
@@ -153,14 +153,15 @@ void Transmitter::ServeResend() {
       std::min(request.last_packet + 1, available ? frame.packets() : request.last_packet + 1);
   Batch batch;
   port_free_ns_ = std::max(port_free_ns_, MonoNowNs());
-  for (std::size_t i = 0; i < kBatch_packets && request.first_packet < end; ++i, ++request.first_packet) {
-    if (available) {
-      Add(batch, frame, MakePacket(frame, request.first_packet, PacketStatus::kResent));
-    } else {
-      Add(batch, frame, MakeUnavailable(request.block_id, request.first_packet));
-    }
+  const std::int64_t until_ns = port_free_ns_ + kBatch_ns;
+  for (std::size_t i = 0; i < kBatch_packets && request.first_packet < end && port_free_ns_ <= until_ns;
+       ++i) {
+    const std::uint32_t packet = request.first_packet++;
+    Add(batch, frame,
+        available ? MakePacket(frame, packet, PacketStatus::kResent)
+                  : MakeUnavailable(request.block_id, packet));
+    ++(available ? counters_.packets_resent : counters_.resends_unavailable);
   }
-  ++(available ? counters_.packets_resent : counters_.resends_unavailable);
   Send(batch);
   if (request.first_packet >= end) {
     resends_.pop_front();
