@@ -4,82 +4,13 @@
 
 #include <algorithm>
 #include <memory>
-#include <string>
 #include <vector>
 
-#include "drivers/camera/camera_aravis.h"
-#include "tests/drivers/camera/camera_rig.h"
-#include "tools/virtual_station/gige/gige_device.h"
+#include "tests/tools/virtual_station/gige/gige_channel.h"
 #include "tools/virtual_station/gige/mono_time.h"
 
 namespace forgescan {
 namespace {
-
-constexpr int kPatience_ms = 30'000;
-constexpr std::int64_t kMs_ns = 1'000'000;
-
-std::shared_ptr<const std::vector<std::uint8_t>> SharedRigImage(std::uint64_t tag) {
-  return std::make_shared<const std::vector<std::uint8_t>>(RigImage(tag));
-}
-
-// One virtual camera and its driver. What it received stays in `frames`.
-struct Channel {
-  std::unique_ptr<GigeDevice> device;
-  std::unique_ptr<CameraAravis> camera;
-  std::vector<CameraFrame> frames;
-
-  std::size_t complete() const {
-    return static_cast<std::size_t>(
-        std::count_if(frames.begin(), frames.end(), [](const CameraFrame& frame) { return frame.complete; }));
-  }
-};
-
-GigeDeviceConfig SmallDevice(const std::string& address) {
-  GigeDeviceConfig config;
-  config.address = address;
-  config.serial = address;
-  config.width_px = kRigWidth_px;
-  config.height_px = kRigHeight_px;
-  config.image = SharedRigImage;
-  return config;
-}
-
-CameraAravisOptions OptionsFor(const GigeDeviceConfig& config) {
-  CameraAravisOptions options;
-  options.address = config.address;
-  options.width_px = config.width_px;
-  options.height_px = config.height_px;
-  options.exposure_us = kRigExposure_us;
-  options.frame_retention_ms = 200;
-  options.teardown_wait_ms = 10'000;
-  options.realtime_thread = false;
-  options.queue_capacity_frames = 200;
-  return options;
-}
-
-std::unique_ptr<Channel> Open(const GigeDeviceConfig& config, const CameraAravisOptions& options) {
-  auto channel = std::make_unique<Channel>();
-  auto device = GigeDevice::Create(config);
-  EXPECT_TRUE(device.ok()) << device.error().message;
-  channel->device = std::move(device).value();
-  channel->camera = std::make_unique<CameraAravis>(options);
-  channel->camera->SetHandler(
-      [self = channel.get()](CameraFrame frame) { self->frames.push_back(std::move(frame)); });
-  const Status started = channel->camera->Start();
-  EXPECT_TRUE(started.ok()) << started.error().message;
-  return channel;
-}
-
-void Fire(Channel& channel, std::int64_t first_ns, std::int64_t period_ns, int count) {
-  for (int i = 0; i < count; ++i) {
-    channel.device->Edge(first_ns + i * period_ns, static_cast<std::uint64_t>(i));
-  }
-}
-
-bool Receive(Channel& channel, std::size_t count) {
-  return DispatchUntil(
-      *channel.camera, [&] { return channel.frames.size() >= count; }, kPatience_ms);
-}
 
 TEST(GigeLine, OnePercentOfPacketsLostIsRepaired) {
   const GigeDeviceConfig config = SmallDevice("127.0.0.1");
@@ -263,58 +194,6 @@ TEST(GigeLine, EdgesThatGiveNoFrameAreCounted) {
   EXPECT_EQ(counters.image_errors, 1U);
   EXPECT_EQ(counters.edges_while_exposing, 1U);
   EXPECT_EQ(counters.frames_exposed, 3U);
-}
-
-TEST(GigeLine, CameraHeldByAnotherIsUnavailableUntilReleased) {
-  const GigeDeviceConfig config = SmallDevice("127.0.0.1");
-  const auto channel = Open(config, OptionsFor(config));
-  CameraAravis second(OptionsFor(config));
-  const Status refused = second.Start();
-  ASSERT_FALSE(refused.ok());
-  EXPECT_EQ(refused.error().code, ErrorCode::kUnavailable) << refused.error().message;
-  EXPECT_EQ(second.state(), Camera::State::kClosed);
-  channel->camera = nullptr;
-  const Status started = second.Start();
-  EXPECT_TRUE(started.ok()) << started.error().message;
-}
-
-TEST(GigeLine, AddressWithoutCameraIsUnavailable) {
-  GigeDeviceConfig config = SmallDevice("127.0.0.3");
-  CameraAravis camera(OptionsFor(config));
-  const Status started = camera.Start();
-  ASSERT_FALSE(started.ok());
-  EXPECT_EQ(started.error().code, ErrorCode::kUnavailable) << started.error().message;
-}
-
-TEST(GigeLine, SettingTheCameraDoesNotHaveIsRefused) {
-  const GigeDeviceConfig config = SmallDevice("127.0.0.1");
-  const auto device = GigeDevice::Create(config);
-  ASSERT_TRUE(device.ok()) << device.error().message;
-  CameraAravisOptions wide = OptionsFor(config);
-  wide.width_px = 4000;  // the sensor has 640
-  CameraAravisOptions odd_line = OptionsFor(config);
-  odd_line.trigger_source = "Line7";
-  for (const CameraAravisOptions& options : {wide, odd_line}) {
-    CameraAravis camera(options);
-    const Status started = camera.Start();
-    ASSERT_FALSE(started.ok());
-    EXPECT_EQ(started.error().code, ErrorCode::kProtocol) << started.error().message;
-  }
-  CameraAravis camera(OptionsFor(config));
-  EXPECT_TRUE(camera.Start().ok());
-}
-
-TEST(GigeLine, OptionsOutOfRangeAreRefusedBeforeAnythingIsSent) {
-  CameraAravisOptions options = OptionsFor(SmallDevice("127.0.0.1"));
-  EXPECT_TRUE(options.Check().ok());
-  options.address = "camera one";
-  EXPECT_EQ(CameraAravis(options).Start().error().code, ErrorCode::kInvalidArgument);
-  options = OptionsFor(SmallDevice("127.0.0.1"));
-  options.packet_size_bytes = 100;
-  EXPECT_EQ(options.Check().error().code, ErrorCode::kInvalidArgument);
-  options = OptionsFor(SmallDevice("127.0.0.1"));
-  options.buffers = 0;
-  EXPECT_EQ(options.Check().error().code, ErrorCode::kInvalidArgument);
 }
 
 }  // namespace
