@@ -2,10 +2,15 @@
 
 #include <unistd.h>
 
+#include <fstream>
+#include <sstream>
+
 #include "services/common/model/bundle_file.h"
 #include "services/common/model/model_import.h"
+#include "tools/virtual_station/commissioning.h"
 #include "tools/virtual_station/station_writer.h"
 #include "tools/virtual_station/virtual_cell.h"
+#include "tools/virtual_station/whole_file.h"
 
 namespace forgescan::testing {
 namespace {
@@ -18,13 +23,10 @@ const fs::path kStation = FORGESCAN_SOURCE_DIR "/stations/virtual";
 
 Status WriteFiles(const CellConfig& config, const fs::path& folder) {
   RETURN_IF_ERROR(WriteStation(config, ProjectedSet::kReduced, folder.string()));
-  std::error_code problem;
-  fs::copy_file(kStation / "station.toml", folder / "station.toml", fs::copy_options::overwrite_existing,
-                problem);
-  if (problem) {
-    return Fail(ErrorCode::kIo, "{} cannot be copied: {}", (kStation / "station.toml").string(),
-                problem.message());
-  }
+  std::stringstream station;
+  station << std::ifstream(kStation / "station.toml").rdbuf();
+  ASSIGN_OR_RETURN(const std::string commissioned, CommissionedStation(config, station.str()));
+  RETURN_IF_ERROR(WriteWholeFile((folder / "station.toml").string(), commissioned));
   ASSIGN_OR_RETURN(const ModelBundle model, LoadModel(folder / "model" / "axle.step", {}));
   return WriteBundle(model, folder / "model" / "axle.bundle");
 }
@@ -78,12 +80,11 @@ Result<const RenderedView*> RenderedCell::View(int part, int view) {
 
 Result<std::map<std::string, double>> RenderedCell::TrueSizesMm(int part) const {
   ASSIGN_OR_RETURN(const PartState state, cell_->cell.Part(part));
-  const AxleSize& size = state.size;
-  return std::map<std::string, double>{{"total_length", size.total_length_mm},
-                                       {"left_plate_width", size.left_plate_width_mm},
-                                       {"right_plate_width", size.right_plate_width_mm},
-                                       {"left_cylinder_diameter", size.left_cylinder_diameter_mm},
-                                       {"right_cylinder_diameter", size.right_cylinder_diameter_mm}};
+  std::map<std::string, double> sizes_mm;
+  for (const AxleDimension& dimension : kAxleDimensions) {
+    sizes_mm[dimension.name] = state.size.*dimension.size_mm;
+  }
+  return sizes_mm;
 }
 
 }  // namespace forgescan::testing

@@ -24,16 +24,17 @@ RobotSimConfig RobotOf(const RenderedCell& cell) {
   return config;
 }
 
-LineSimConfig LineOf(int parts) {
+LineSimConfig LineOf(int parts, int first_part) {
   LineSimConfig config;
+  config.first_part = static_cast<std::uint32_t>(first_part);
   config.parts = parts;
   return config;
 }
 
 }  // namespace
 
-Result<std::unique_ptr<SimLine>> SimLine::Create(RenderedCell& cell, int parts) {
-  std::unique_ptr<SimLine> line(new SimLine(cell, parts));
+Result<std::unique_ptr<SimLine>> SimLine::Create(RenderedCell& cell, int parts, int first_part) {
+  std::unique_ptr<SimLine> line(new SimLine(cell, LineOf(parts, first_part)));
   ASSIGN_OR_RETURN(const Station station, Station::Load(cell.folder().string()));
   RETURN_IF_ERROR(line->MakeCellServices(station));
   RETURN_IF_ERROR(line->MakeCamera(station, 0));
@@ -44,7 +45,8 @@ Result<std::unique_ptr<SimLine>> SimLine::Create(RenderedCell& cell, int parts) 
   return line;
 }
 
-SimLine::SimLine(RenderedCell& cell, int parts) : cell_(cell), robot_(RobotOf(cell)), line_(LineOf(parts)) {
+SimLine::SimLine(RenderedCell& cell, const LineSimConfig& line)
+    : cell_(cell), robot_(RobotOf(cell)), line_(line) {
   for (const char* name : {"robot", "trigger", "cooling", "camera_left", "camera_right", "reconstruction",
                            "fusion", "registration", "report", "observer"}) {
     hosts_[name] = std::make_unique<Host>(network_, name);

@@ -52,7 +52,7 @@ class SimLine {
   // The services as their programs make them from the station's folder, which `cell` has made; it outlives
   // the line. Results of an earlier line are removed. Errors: those of the services' configurations and
   // files.
-  static Result<std::unique_ptr<SimLine>> Create(RenderedCell& cell, int parts);
+  static Result<std::unique_ptr<SimLine>> Create(RenderedCell& cell, int parts, int first_part = 1);
 
   void SetBusFaults(const SimFaults& faults) { network_.SetFaults(faults); }
   void LoseFrame(const LostFrame& frame) { lost_frame_ = frame; }
@@ -70,6 +70,8 @@ class SimLine {
   const std::vector<fsmsg::scan_complete_t>& scans() const { return scans_; }
   const std::vector<fsmsg::verdict_t>& verdicts() const { return verdicts_; }
   const std::vector<fsmsg::part_sorted_t>& sorted() const { return sorted_; }
+  // What the line's gate was told.
+  const std::vector<LineCommand>& commands() const { return line_.sorted(); }
   // Every message from VIEW_CLOUD to VERDICT in order of arrival, with its channel before it.
   const std::vector<Bytes>& published() const { return published_; }
   // Sums over all services.
@@ -77,7 +79,7 @@ class SimLine {
   std::int64_t Total(const std::string& counter) const;
 
  private:
-  SimLine(RenderedCell& cell, int parts);
+  SimLine(RenderedCell& cell, const LineSimConfig& line);
   Host& At(const char* name) { return *hosts_.at(name); }
   Status MakeCellServices(const Station& station);
   Status MakeCamera(const Station& station, std::size_t side);

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 namespace forgescan {
@@ -15,14 +16,16 @@ using testing::SimLine;
 
 constexpr std::int64_t kSecondUs = 1'000'000;
 constexpr auto kOk = fsmsg::verdict_t::VERDICT_OK;
+constexpr auto kNotOk = fsmsg::verdict_t::VERDICT_NOT_OK;
+constexpr auto kNotDecidable = fsmsg::verdict_t::VERDICT_NOT_DECIDABLE;
 constexpr auto kNotInspected = fsmsg::verdict_t::VERDICT_NOT_INSPECTED;
 
 // mm. Two parts came out within 0.06; the taught views alone stand for up to 0.08 (3 sigma, station_test),
 // and a pixel covers 0.87 instead of 0.22, which leaves a tenth of the points for each face.
 constexpr double kSizeToleranceMm = 0.15;
 
-std::unique_ptr<SimLine> MakeLine(RenderedCell& cell, int parts) {
-  auto line = SimLine::Create(cell, parts);
+std::unique_ptr<SimLine> MakeLine(RenderedCell& cell, int parts, int first_part = 1) {
+  auto line = SimLine::Create(cell, parts, first_part);
   EXPECT_TRUE(line.ok()) << line.error().message;
   return line.ok() ? std::move(*line) : nullptr;
 }
@@ -49,7 +52,8 @@ class SimLineTest : public ::testing::Test {
   }
   // The part has one verdict, the line has heard it, and no size is claimed for what was not inspected.
   static void ExpectSorted(const SimLine& line, int part, int verdict) {
-    const auto index = static_cast<std::size_t>(part - 1);
+    ASSERT_FALSE(line.verdicts().empty());
+    const auto index = static_cast<std::size_t>(part - line.verdicts().front().part);
     ASSERT_GT(line.verdicts().size(), index);
     EXPECT_EQ(line.verdicts()[index].part, part);
     EXPECT_EQ(line.verdicts()[index].verdict, verdict) << line.verdicts()[index].reason;
@@ -57,11 +61,35 @@ class SimLineTest : public ::testing::Test {
     EXPECT_EQ(line.sorted()[index].part, part);
     EXPECT_EQ(line.sorted()[index].verdict, verdict);
     EXPECT_EQ(line.sorted()[index].acknowledged, 1) << line.sorted()[index].reason;
+    ASSERT_GT(line.commands().size(), index);
+    EXPECT_EQ(line.commands()[index].part, static_cast<std::uint32_t>(part));
+    EXPECT_EQ(static_cast<int>(line.commands()[index].verdict), verdict);
     if (verdict == kNotInspected) {
       for (const fsmsg::dimension_t& dimension : line.verdicts()[index].dimensions) {
         EXPECT_TRUE(std::isnan(dimension.measured_mm)) << dimension.name;
       }
     }
+  }
+
+  // What the truth makes of a size: a verdict where it is farther than 2 U from both limits, so that no
+  // measurement within U of it can say otherwise; nearer, none is right or wrong.
+  static void ExpectVerdictsAsTheTruth(const fsmsg::verdict_t& verdict) {
+    const auto truth = cell_->TrueSizesMm(verdict.part);
+    ASSERT_TRUE(truth.ok()) << truth.error().message;
+    for (const fsmsg::dimension_t& dimension : verdict.dimensions) {
+      const double size_mm = truth->at(dimension.name);
+      const double inside_mm = std::min(size_mm - dimension.lower_mm, dimension.upper_mm - size_mm);
+      EXPECT_LT(std::abs(dimension.measured_mm - size_mm), dimension.uncertainty_mm) << dimension.name;
+      if (std::abs(inside_mm) > 2 * dimension.uncertainty_mm) {
+        EXPECT_EQ(dimension.verdict, inside_mm > 0 ? kOk : kNotOk)
+            << "part " << verdict.part << ": " << dimension.name;
+      }
+    }
+  }
+  static int VerdictOf(const fsmsg::verdict_t& verdict, const std::string& name) {
+    const auto found = std::find_if(verdict.dimensions.begin(), verdict.dimensions.end(),
+                                    [&](const auto& dimension) { return dimension.name == name; });
+    return found != verdict.dimensions.end() ? found->verdict : fsmsg::verdict_t::VERDICT_UNKNOWN;
   }
 
   // What one undisturbed part gives; the other tests are held against it.
@@ -102,6 +130,28 @@ TEST_F(SimLineTest, MeasuresAndSortsAPart) {
   EXPECT_EQ(line->Total("frames_missing"), 0);
   EXPECT_EQ(line->Total("errors"), 0);
   EXPECT_EQ(line->published(), Nominal().published);
+}
+
+// Parts 6 and 7 of stations/virtual/cell.toml are too short, and nearer to a limit than can be measured.
+TEST_F(SimLineTest, SortsByTheTruthAndNamesTheSizeThatIsWrong) {
+  const auto line = MakeLine(*cell_, 3, 6);
+  ASSERT_NE(line, nullptr);
+  ASSERT_TRUE(line->RunUntilSorted(3));
+  ASSERT_EQ(line->verdicts().size(), 3u);
+  ExpectSorted(*line, 6, kNotOk);
+  ExpectSorted(*line, 7, kNotDecidable);
+  ExpectSorted(*line, 8, kOk);
+  for (const fsmsg::verdict_t& verdict : line->verdicts()) {
+    ExpectTrueSizes(verdict);
+    ExpectVerdictsAsTheTruth(verdict);
+    const int length = verdict.part == 6 ? kNotOk : kOk;
+    const int diameter = verdict.part == 7 ? kNotDecidable : kOk;
+    EXPECT_EQ(VerdictOf(verdict, "total_length"), length) << verdict.part;
+    EXPECT_EQ(VerdictOf(verdict, "right_cylinder_diameter"), diameter) << verdict.part;
+    EXPECT_EQ(VerdictOf(verdict, "left_plate_width"), kOk) << verdict.part;
+    EXPECT_EQ(VerdictOf(verdict, "right_plate_width"), kOk) << verdict.part;
+    EXPECT_EQ(VerdictOf(verdict, "left_cylinder_diameter"), kOk) << verdict.part;
+  }
 }
 
 TEST_F(SimLineTest, ABusThatLosesATenthChangesNoSize) {

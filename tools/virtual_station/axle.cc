@@ -124,20 +124,13 @@ Error Broken(const Standard_Failure& failure) {
 }  // namespace
 
 Status Check(const AxleSize& size) {
-  const AxleSize design;
-  const struct {
-    const char* name;
-    double value, design;
-  } rows[] = {
-      {"total_length", size.total_length_mm, design.total_length_mm},
-      {"left_plate_width", size.left_plate_width_mm, design.left_plate_width_mm},
-      {"right_plate_width", size.right_plate_width_mm, design.right_plate_width_mm},
-      {"left_cylinder_diameter", size.left_cylinder_diameter_mm, design.left_cylinder_diameter_mm},
-      {"right_cylinder_diameter", size.right_cylinder_diameter_mm, design.right_cylinder_diameter_mm}};
-  for (const auto& row : rows) {
-    if (!(std::abs(row.value / row.design - 1.0) <= 0.05)) {
-      return Fail(ErrorCode::kInvalidArgument, "axle: {} is {} mm, allowed {} to {} mm", row.name, row.value,
-                  0.95 * row.design, 1.05 * row.design);
+  const AxleSize design_size;
+  for (const AxleDimension& dimension : kAxleDimensions) {
+    const double value = size.*dimension.size_mm;
+    const double design = design_size.*dimension.size_mm;
+    if (!(std::abs(value / design - 1.0) <= 0.05)) {
+      return Fail(ErrorCode::kInvalidArgument, "axle: {} is {} mm, allowed {} to {} mm", dimension.name,
+                  value, 0.95 * design, 1.05 * design);
     }
   }
   return {};

@@ -5,6 +5,7 @@
 // the middle of the axis of the end cylinders. Units: mm, at the reference temperature.
 #pragma once
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -22,6 +23,18 @@ struct AxleSize {
   double left_cylinder_diameter_mm = 89.7;
   double right_cylinder_diameter_mm = 88.5;
 };
+
+// By the names that features.toml and reports use.
+struct AxleDimension {
+  const char* name;
+  double AxleSize::*size_mm;
+};
+inline constexpr std::array<AxleDimension, 5> kAxleDimensions = {
+    {{"total_length", &AxleSize::total_length_mm},
+     {"left_plate_width", &AxleSize::left_plate_width_mm},
+     {"right_plate_width", &AxleSize::right_plate_width_mm},
+     {"left_cylinder_diameter", &AxleSize::left_cylinder_diameter_mm},
+     {"right_cylinder_diameter", &AxleSize::right_cylinder_diameter_mm}}};
 
 // Within 5 % of the design: beyond, the pieces of the shape would no longer meet as intended. Errors:
 // kInvalidArgument.

@@ -2,28 +2,17 @@
 
 #include <cmath>
 #include <filesystem>
-#include <numbers>
 #include <utility>
 
-#include "tools/virtual_station/toml_section.h"
+#include "tools/virtual_station/cell_sections.h"
 
 namespace forgescan {
 namespace {
 
 constexpr int kCameraWidthPx = 2448;
 constexpr int kCameraHeightPx = 2048;
-constexpr double kDegree = std::numbers::pi / 180.0;
 
-struct File {
-  const toml::table& root;
-  std::string path;
-
-  TomlSection Section(const std::string& name) const {
-    return {root.get_as<toml::table>(name), fmt::format("{} [{}]", path, name)};
-  }
-};
-
-Result<Lens> ReadLens(const File& file, const std::string& section_name, double scale) {
+Result<Lens> ReadLens(const CellFile& file, const std::string& section_name, double scale) {
   TomlSection s = file.Section(section_name);
   Lens lens;
   lens.fx_px = scale * s.Number("focal_x_px", {500, 20000});
@@ -49,7 +38,7 @@ Eigen::Isometry3d LookingAt(const Eigen::Vector3d& place_in_rig, double distance
   return rig_from_device.inverse();
 }
 
-Status ReadRig(const File& file, int scale_divisor, CellConfig& config) {
+Status ReadRig(const CellFile& file, int scale_divisor, CellConfig& config) {
   TomlSection image = file.Section("image");
   const int divisor_in_file = image.Integer("scale_divisor", {1, 8});
   RETURN_IF_ERROR(image.Finish());
@@ -79,136 +68,8 @@ Status ReadRig(const File& file, int scale_divisor, CellConfig& config) {
   return {};
 }
 
-Result<PartConfig> ReadPart(const File& file) {
-  TomlSection s = file.Section("part");
-  PartConfig part{};
-  part.nominal.total_length_mm = s.Number("total_length_mm", {1800, 1980});
-  part.nominal.left_plate_width_mm = s.Number("left_plate_width_mm", {171, 187});
-  part.nominal.right_plate_width_mm = s.Number("right_plate_width_mm", {169, 186});
-  part.nominal.left_cylinder_diameter_mm = s.Number("left_cylinder_diameter_mm", {86, 94});
-  part.nominal.right_cylinder_diameter_mm = s.Number("right_cylinder_diameter_mm", {85, 92});
-  part.length_sd_mm = s.Number("length_sd_mm", {0, 2});
-  part.plate_sd_mm = s.Number("plate_sd_mm", {0, 1});
-  part.cylinder_sd_mm = s.Number("cylinder_sd_mm", {0, 1});
-  part.plate_wear_mm_per_part = s.Number("plate_wear_mm_per_part", {-0.2, 0.2});
-  part.cylinder_wear_mm_per_part = s.Number("cylinder_wear_mm_per_part", {-0.2, 0.2});
-  part.position_scatter_mm = s.Number("position_scatter_mm", {0, 20});
-  part.rotation_scatter_deg = s.Number("rotation_scatter_deg", {0, 5});
-  part.length_tolerance_mm = s.Number("length_tolerance_mm", {0.01, 20});
-  part.plate_tolerance_mm = s.Number("plate_tolerance_mm", {0.01, 20});
-  part.cylinder_tolerance_mm = s.Number("cylinder_tolerance_mm", {0.01, 20});
-  RETURN_IF_ERROR(s.Finish());
-  return part;
-}
-
-Result<HeatConfig> ReadHeat(const File& file) {
-  TomlSection s = file.Section("heat");
-  HeatConfig heat{};
-  heat.reference_degc = s.Number("reference_degc", {20, 1200});
-  heat.start_degc = s.Number("start_degc", {20, 1200});
-  heat.start_sd_k = s.Number("start_sd_k", {0, 50});
-  heat.first_view_s = s.Number("first_view_s", {0, 600});
-  heat.view_interval_s = s.Number("view_interval_s", {0.1, 60});
-  heat.law.emissivity = s.Number("emissivity", {0, 1});
-  heat.law.convection_w_per_m2k = s.Number("convection_w_per_m2k", {0, 200});
-  heat.law.ambient_degc = s.Number("ambient_degc", {-20, 60});
-  heat.law.bar_diameter_mm = s.Number("bar_diameter_mm", {20, 500});
-  heat.law.density_kg_per_m3 = s.Number("density_kg_per_m3", {7000, 8500});
-  heat.pyrometer_bias_sd_k = s.Number("pyrometer_bias_sd_k", {0, 50});
-  heat.pyrometer_noise_sd_k = s.Number("pyrometer_noise_sd_k", {0, 20});
-  RETURN_IF_ERROR(s.Finish());
-  return heat;
-}
-
-Result<RobotScatter> ReadRobot(const File& file) {
-  TomlSection s = file.Section("robot");
-  RobotScatter robot{};
-  robot.position_sd_mm = s.Number("position_sd_mm", {0, 1});
-  robot.rotation_sd_rad = s.Number("rotation_sd_rad", {0, 0.01});
-  robot.marker_sd_mm = s.Number("marker_sd_mm", {0, 1});
-  robot.markers = s.Integer("markers", {4, 100});
-  RETURN_IF_ERROR(s.Finish());
-  return robot;
-}
-
-Result<CalibrationErrorConfig> ReadCalibrationError(const File& file) {
-  TomlSection s = file.Section("calibration_error");
-  CalibrationErrorConfig error{};
-  error.focal_sd_px = s.Number("focal_sd_px", {0, 20});
-  error.centre_sd_px = s.Number("centre_sd_px", {0, 20});
-  error.k1_sd = s.Number("k1_sd", {0, 0.05});
-  error.rotation_sd_rad = s.Number("rotation_sd_rad", {0, 0.01});
-  error.translation_sd_mm = s.Number("translation_sd_mm", {0, 2});
-  RETURN_IF_ERROR(s.Finish());
-  return error;
-}
-
-Result<ProjectorLightConfig> ReadProjectorLight(const File& file) {
-  TomlSection s = file.Section("projector_light");
-  ProjectorLightConfig light{};
-  light.mean_level = s.Number("mean_level", {0.1, 0.6});
-  light.amplitude = s.Number("amplitude", {0.01, 0.5});
-  light.second_harmonic_ratio = s.Number("second_harmonic_ratio", {0, 0.3});
-  light.black_level = s.Number("black_level", {0, 0.1});
-  light.blur_px = s.Number("blur_px", {0, 5});
-  light.level_sd = s.Number("level_sd", {0, 0.1});
-  light.unambiguous_px = s.Number("unambiguous_px", {320, 10000});
-  const Eigen::Vector3d counts = s.Vector3("fringe_counts", {1, 200});
-  RETURN_IF_ERROR(s.Finish());
-  for (const double count : counts) {
-    if (count != std::floor(count)) {
-      return Fail(ErrorCode::kFormat, "{} [projector_light]: fringe_counts must be whole numbers", file.path);
-    }
-    light.fringe_counts.push_back(static_cast<int>(count));
-  }
-  if (light.amplitude > light.mean_level) {
-    return Fail(ErrorCode::kFormat, "{} [projector_light]: amplitude is {}, allowed 0.01 to mean_level = {}",
-                file.path, light.amplitude, light.mean_level);
-  }
-  return light;
-}
-
-Result<SensorConfig> ReadSensor(const File& file) {
-  TomlSection s = file.Section("sensor");
-  SensorConfig sensor{};
-  sensor.read_noise_dn = s.Number("read_noise_dn", {0, 20});
-  sensor.gain_dn = s.Number("gain_dn", {0, 1});
-  sensor.dark_level_dn = s.Number("dark_level_dn", {0, 50});
-  sensor.white_dn = s.Number("white_dn", {10, 2000});
-  sensor.ambient_dn = s.Number("ambient_dn", {0, 200});
-  sensor.glow_dn = s.Number("glow_dn", {0, 200});
-  sensor.glow_per_k = s.Number("glow_per_k", {0, 0.1});
-  RETURN_IF_ERROR(s.Finish());
-  return sensor;
-}
-
-Result<SurfaceConfig> ReadSurface(const File& file) {
-  TomlSection s = file.Section("surface");
-  SurfaceConfig surface{};
-  surface.part_albedo = s.Number("part_albedo", {0.01, 1});
-  surface.cell_albedo = s.Number("cell_albedo", {0.01, 1});
-  surface.texture_contrast = s.Number("texture_contrast", {0, 0.9});
-  surface.texture_size_mm = s.Number("texture_size_mm", {0.2, 100});
-  surface.specular = s.Number("specular", {0, 1});
-  RETURN_IF_ERROR(s.Finish());
-  return surface;
-}
-
-// The tables of an array of tables. Errors: kFormat if it is missing, empty or something else.
-Result<std::vector<const toml::table*>> Tables(const File& file, const std::string& name) {
-  const toml::array* array = file.root.get_as<toml::array>(name);
-  if (array == nullptr || array->empty() || !array->is_array_of_tables()) {
-    return Fail(ErrorCode::kFormat, "{}: [[{}]] must be given at least once", file.path, name);
-  }
-  std::vector<const toml::table*> tables;
-  for (const toml::node& node : *array) {
-    tables.push_back(node.as_table());
-  }
-  return tables;
-}
-
-Result<std::vector<ViewConfig>> ReadViews(const File& file) {
-  ASSIGN_OR_RETURN(const auto tables, Tables(file, "view"));
+Result<std::vector<ViewConfig>> ReadViews(const CellFile& file) {
+  ASSIGN_OR_RETURN(const auto tables, file.Tables("view"));
   std::vector<ViewConfig> views;
   for (const toml::table* table : tables) {
     const std::string place = fmt::format("{} [[view]] {}", file.path, views.size());
@@ -228,8 +89,8 @@ Result<std::vector<ViewConfig>> ReadViews(const File& file) {
   return views;
 }
 
-Result<std::vector<BoxConfig>> ReadBoxes(const File& file) {
-  ASSIGN_OR_RETURN(const auto tables, Tables(file, "box"));
+Result<std::vector<BoxConfig>> ReadBoxes(const CellFile& file) {
+  ASSIGN_OR_RETURN(const auto tables, file.Tables("box"));
   std::vector<BoxConfig> boxes;
   for (const toml::table* table : tables) {
     const std::string place = fmt::format("{} [[box]] {}", file.path, boxes.size());
@@ -245,11 +106,11 @@ Result<std::vector<BoxConfig>> ReadBoxes(const File& file) {
 }
 
 // Every section is known, and `seed` is the only key outside them.
-Status CheckSections(const File& file) {
+Status CheckSections(const CellFile& file) {
   const std::set<std::string> known = {
-      "seed",    "image", "rig",   "camera_left",       "camera_right",    "projector",
-      "part",    "heat",  "robot", "calibration_error", "projector_light", "sensor",
-      "surface", "view",  "box"};
+      "seed",     "image", "rig",   "camera_left",       "camera_right",        "projector",       "part",
+      "odd_part", "heat",  "robot", "calibration_error", "commissioning_error", "projector_light", "sensor",
+      "surface",  "view",  "box"};
   for (const auto& [key, node] : file.root) {
     if (!known.contains(std::string(key.str()))) {
       return Fail(ErrorCode::kFormat, "{}: {} is not a section or key of the virtual cell", file.path,
@@ -259,7 +120,7 @@ Status CheckSections(const File& file) {
   return {};
 }
 
-Result<CellConfig> ReadConfig(const File& file, int scale_divisor) {
+Result<CellConfig> ReadConfig(const CellFile& file, int scale_divisor) {
   RETURN_IF_ERROR(CheckSections(file));
   CellConfig config;
   const auto seed = file.root["seed"].value<std::int64_t>();
@@ -272,6 +133,7 @@ Result<CellConfig> ReadConfig(const File& file, int scale_divisor) {
   ASSIGN_OR_RETURN(config.heat, ReadHeat(file));
   ASSIGN_OR_RETURN(config.robot, ReadRobot(file));
   ASSIGN_OR_RETURN(config.calibration_error, ReadCalibrationError(file));
+  ASSIGN_OR_RETURN(config.commissioning_error, ReadCommissioningError(file));
   ASSIGN_OR_RETURN(config.projector_light, ReadProjectorLight(file));
   ASSIGN_OR_RETURN(config.sensor, ReadSensor(file));
   ASSIGN_OR_RETURN(config.surface, ReadSurface(file));

@@ -13,6 +13,13 @@
 
 namespace forgescan {
 
+// A part one size of which went wrong, whatever scatter and wear would have made of it.
+struct OddPart {
+  int part;
+  double AxleSize::*size_mm;  // which
+  double mm;
+};
+
 struct PartConfig {
   AxleSize nominal;
   double length_sd_mm, plate_sd_mm, cylinder_sd_mm;          // from part to part
@@ -21,6 +28,7 @@ struct PartConfig {
   double rotation_scatter_deg;                               // uniform +- about each axis
   double length_tolerance_mm, plate_tolerance_mm,
       cylinder_tolerance_mm;  // +- about nominal, for features.toml
+  std::vector<OddPart> odd_parts;
 };
 
 struct HeatConfig {
@@ -42,6 +50,14 @@ struct CalibrationErrorConfig {
   double focal_sd_px, centre_sd_px;
   double k1_sd;
   double rotation_sd_rad, translation_sd_mm;
+};
+
+// Relative errors of what the station's files say of light, cameras and steel, standard deviations.
+struct CommissioningErrorConfig {
+  double contrast_sd;         // of each contrast of the pattern
+  double noise_sd;            // of the cameras' read noise, and of their gain
+  double expansion_sd;        // of the whole expansion curve: the sample is of another heat of the steel
+  double expansion_point_sd;  // of each point of it, absolute
 };
 
 struct ProjectorLightConfig {
@@ -92,6 +108,7 @@ struct CellConfig {
   HeatConfig heat;
   RobotScatter robot;
   CalibrationErrorConfig calibration_error;
+  CommissioningErrorConfig commissioning_error;
   ProjectorLightConfig projector_light;
   SensorConfig sensor;
   SurfaceConfig surface;

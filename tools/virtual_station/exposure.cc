@@ -81,7 +81,7 @@ void Digitise(const float* grey, const float* noise, int width, const SensorConf
 
 std::vector<std::uint8_t> ExposeImage(const GeometryMap& map, const ExposureRequest& request) {
   const ImageKey& key = request.key;
-  RandomStream flicker(key.seed, RandomUse::kProjectorLevel, {key.part, key.view, key.pattern});
+  RandomStream flicker(key.seed, RandomUse::kProjectorLevel, {key.part, key.view, key.visit, key.pattern});
   const LevelTable level(request.light, request.pattern, 1.0 + request.light.level_sd * flicker.Gaussian());
   const std::vector<float>& noise = NoiseTable();
   std::vector<std::uint8_t> image(map.sample.size());
@@ -99,7 +99,7 @@ std::vector<std::uint8_t> ExposeImage(const GeometryMap& map, const ExposureRequ
       grey[static_cast<std::size_t>(edge->pixel) - row_start(y)] = EdgeGrey(*edge, level);
     }
     RandomStream random(key.seed, RandomUse::kPixelNoise,
-                        {key.part, key.view, static_cast<int>(key.side), key.pattern, y});
+                        {key.part, key.view, key.visit, static_cast<int>(key.side), key.pattern, y});
     const float* row_noise = &noise[random.Bits() % kNoiseLength];
     Digitise(grey.data(), row_noise, map.width, request.sensor, &image[row_start(y)]);
   });

@@ -13,6 +13,7 @@ namespace forgescan {
 struct ImageKey {
   std::uint64_t seed = 0;
   int part = 0, view = 0;
+  int visit = 0;  // of the view: one that is taken again is another image
   Side side = Side::kLeft;
   int pattern = 0;  // index in the order of projection
 };

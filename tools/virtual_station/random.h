@@ -24,6 +24,9 @@ enum class RandomUse : std::uint64_t {
   kPixelNoise,
   kProjectorLevel,
   kTexture,
+  kMeasuredPattern,
+  kMeasuredNoise,
+  kMeasuredExpansion,
 };
 
 // A bijective mix of 64 bits (the finaliser of splitmix64).

@@ -79,6 +79,11 @@ AxleSize ActualSize(const PartConfig& config, std::uint64_t seed, int part) {
   const double cylinder_wear = config.cylinder_wear_mm_per_part * part;
   size.left_cylinder_diameter_mm += cylinder_wear + config.cylinder_sd_mm * random.Gaussian();
   size.right_cylinder_diameter_mm += cylinder_wear + config.cylinder_sd_mm * random.Gaussian();
+  for (const OddPart& odd : config.odd_parts) {
+    if (odd.part == part) {
+      size.*odd.size_mm = odd.mm;
+    }
+  }
   return size;
 }
 

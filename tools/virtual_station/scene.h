@@ -19,7 +19,8 @@ Eigen::Isometry3d TaughtRigPose(const ViewConfig& view, double working_distance_
 // A small rigid motion: rotation vector and shift, each component Gaussian.
 Eigen::Isometry3d SmallMotion(RandomStream& random, double position_sd_mm, double rotation_sd_rad);
 
-// The true size of part `part` (0, 1, ...) at the reference temperature: seeded variation plus die wear.
+// The true size of part `part` (0, 1, ...) at the reference temperature: seeded variation plus die
+// wear, and what went wrong with it.
 AxleSize ActualSize(const PartConfig& config, std::uint64_t seed, int part);
 
 // How part `part` lies on the conveyor.

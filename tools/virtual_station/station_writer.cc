@@ -6,6 +6,7 @@
 #include <opencv2/core/eigen.hpp>
 #include <opencv2/core/persistence.hpp>
 
+#include "tools/virtual_station/commissioning.h"
 #include "tools/virtual_station/teaching.h"
 #include "tools/virtual_station/whole_file.h"
 
@@ -42,17 +43,6 @@ Status WriteCalibration(const Rig& rig, const std::string& path) {
   return WriteWholeFile(path, file.releaseAndGetString());
 }
 
-// First harmonic and mean of a sinusoid as projected, fractions of white.
-struct Sinusoid {
-  double mean, amplitude;
-};
-Sinusoid Measure(const ProjectorLightConfig& light, double period_px) {
-  const auto level = [&](double quarter) {
-    return PatternLevel(light, {period_px, 0.0}, 0.25 * quarter * period_px);
-  };
-  return {0.25 * (level(0) + level(1) + level(2) + level(3)), 0.5 * (level(0) - level(2))};
-}
-
 std::string FrequencyText(const std::vector<Pattern>& patterns, double period_px, double modulation_ratio) {
   std::string frames, shifts;
   for (std::size_t i = 0; i < patterns.size(); ++i) {
@@ -69,19 +59,17 @@ std::string FrequencyText(const std::vector<Pattern>& patterns, double period_px
 
 // Frequencies in the order of projection, so that the order of listing is the order of the frames.
 std::string PatternText(const CellConfig& config, ProjectedSet set) {
-  const ProjectorLightConfig& light = config.projector_light;
-  const std::vector<Pattern> patterns = ProjectedPatterns(light, set);
-  const Sinusoid first = Measure(light, patterns.front().period_px);
-  const double white = PatternLevel(light, patterns.back(), 0.0);
+  const std::vector<Pattern> patterns = ProjectedPatterns(config.projector_light, set);
+  const MeasuredPattern measured = MeasurePattern(config, set);
   std::string text = fmt::format(
       "projector_width_px = {}\nbackground = \"{}\"\nreference = \"pattern_{:02}.png\"\n",
       config.rig.projector.width_px, set == ProjectedSet::kReduced ? "shared" : "own", patterns.size() - 1);
-  text += fmt::format("reference_contrast = {:.5f}\n", first.amplitude / (white - first.mean));
+  text += fmt::format("reference_contrast = {:.5f}\n", measured.reference_contrast);
+  auto ratio = measured.modulation_ratio.begin();
   double last_period_px = 0.0;
   for (const Pattern& pattern : patterns) {
     if (pattern.period_px != last_period_px && pattern.period_px != 0.0) {
-      text += FrequencyText(patterns, pattern.period_px,
-                            Measure(light, pattern.period_px).amplitude / first.amplitude);
+      text += FrequencyText(patterns, pattern.period_px, *ratio++);
     }
     last_period_px = pattern.period_px;
   }

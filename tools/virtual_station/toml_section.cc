@@ -56,6 +56,14 @@ int TomlSection::Integer(const std::string& key, Range range) {
   return static_cast<int>(Checked(*node, key, range));
 }
 
+std::string TomlSection::Text(const std::string& key) {
+  const toml::node* node = Find(key);
+  if (node != nullptr && !node->is_string()) {
+    Blame(key, "must be a text");
+  }
+  return node != nullptr && node->is_string() ? *node->value<std::string>() : std::string();
+}
+
 Eigen::Vector3d TomlSection::Vector3(const std::string& key, Range range) {
   const toml::node* node = Find(key);
   const toml::array* array = node == nullptr ? nullptr : node->as_array();

@@ -17,7 +17,7 @@ struct Range {
 };
 
 // Ask for keys, then call Finish(): it tells the first thing that was wrong. Until then a wrong value reads
-// as the lower limit, so a section's values may be used only after Finish() was ok.
+// as the lower limit or as nothing, so a section's values may be used only after Finish() was ok.
 class TomlSection {
  public:
   // `place` is for messages: file and section. A null table means that the section is missing.
@@ -25,6 +25,7 @@ class TomlSection {
 
   double Number(const std::string& key, Range range);
   int Integer(const std::string& key, Range range);
+  std::string Text(const std::string& key);
   Eigen::Vector3d Vector3(const std::string& key, Range range);
 
   // kFormat: a missing, mistyped, out-of-range or unknown key. `place: key ...`.

@@ -43,6 +43,7 @@ Json ViewTruth(const ViewState& view) {
   const Eigen::Vector3d shift = view.taught_from_actual.translation();
   const Eigen::Vector3d rotation = turn.angle() * turn.axis();
   return {{"view", view.view},
+          {"visit", view.visit},
           {"time_s", view.time_s},
           {"part_degc", view.part_degc},
           {"pyrometer_degc", view.pyrometer_degc},

@@ -29,10 +29,10 @@ Result<PartState> VirtualCell::Part(int part) const {
 }
 
 Result<ViewState> VirtualCell::View(const PartState& part, int view) const {
-  return View(part, view, config_.heat.first_view_s + view * config_.heat.view_interval_s);
+  return View(part, view, config_.heat.first_view_s + view * config_.heat.view_interval_s, 0);
 }
 
-Result<ViewState> VirtualCell::View(const PartState& part, int view, double time_s) const {
+Result<ViewState> VirtualCell::View(const PartState& part, int view, double time_s, int visit) const {
   if (view < 0 || static_cast<std::size_t>(view) >= config_.views.size()) {
     return Fail(ErrorCode::kInvalidArgument, "view is {}, the path has views 0 to {}", view,
                 config_.views.size() - 1);
@@ -40,14 +40,15 @@ Result<ViewState> VirtualCell::View(const PartState& part, int view, double time
   ViewState state;
   state.part = part.part;
   state.view = view;
+  state.visit = visit;
   state.time_s = time_s;
   ASSIGN_OR_RETURN(state.part_degc, TemperatureAfter(config_.heat.law, part.start_degc, state.time_s));
   ASSIGN_OR_RETURN(state.scale, SizeScale(state.part_degc, config_.heat.reference_degc));
-  RandomStream reading(config_.seed, RandomUse::kPyrometer, {part.part, view});
+  RandomStream reading(config_.seed, RandomUse::kPyrometer, {part.part, view, visit});
   state.pyrometer_degc =
       Pyrometer{part.pyrometer_bias_k, config_.heat.pyrometer_noise_sd_k}.Read(state.part_degc, reading);
-  RandomStream visit(config_.seed, RandomUse::kRobotVisit, {part.part, view});
-  state.taught_from_actual = SmallMotion(visit, config_.robot.position_sd_mm, config_.robot.rotation_sd_rad);
+  RandomStream error(config_.seed, RandomUse::kRobotVisit, {part.part, view, visit});
+  state.taught_from_actual = SmallMotion(error, config_.robot.position_sd_mm, config_.robot.rotation_sd_rad);
   const ViewConfig& taught = config_.views[static_cast<std::size_t>(view)];
   state.array_from_rig = TaughtRigPose(taught, config_.working_distance_mm) * state.taught_from_actual;
   return state;
@@ -74,7 +75,7 @@ std::vector<Pattern> VirtualCell::Patterns(ProjectedSet set) const {
 
 std::vector<std::uint8_t> VirtualCell::Image(const GeometryMap& map, const ViewState& view, Side side,
                                              const Pattern& pattern, int pattern_index) const {
-  const ImageKey key{config_.seed, view.part, view.view, side, pattern_index};
+  const ImageKey key{config_.seed, view.part, view.view, view.visit, side, pattern_index};
   return ExposeImage(map, {config_.projector_light, config_.sensor, pattern, key, threads_});
 }
 

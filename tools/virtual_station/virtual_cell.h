@@ -23,6 +23,7 @@ struct PartState {
 // The cell at the moment of one view of one part.
 struct ViewState {
   int part = 0, view = 0;
+  int visit = 0;        // 0, 1, ...: the robot comes to a view again after a void capture
   double time_s = 0.0;  // after start_degc
   double part_degc = 0.0;
   double pyrometer_degc = 0.0;
@@ -42,8 +43,8 @@ class VirtualCell {
   Result<PartState> Part(int part) const;
 
   // Errors: kInvalidArgument for a view that does not exist or a temperature outside the steel's tables.
-  Result<ViewState> View(const PartState& part, int view, double time_s) const;
-  // At the time the configuration plans for it.
+  Result<ViewState> View(const PartState& part, int view, double time_s, int visit) const;
+  // The first visit, at the time the configuration plans for it.
   Result<ViewState> View(const PartState& part, int view) const;
 
   // Errors: as View.

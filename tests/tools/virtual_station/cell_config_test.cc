@@ -48,6 +48,24 @@ TEST(CellConfig, SmallerImagesSeeTheSameField) {
   EXPECT_LT((corner_full - corner_quarter).norm(), 1e-10);  // slope: rounding
 }
 
+TEST(CellConfig, OddPartsAreOptionalAndOfTheAxle) {
+  const auto none =
+      LoadChanged("[[odd_part]]\npart = 6\ndimension = \"total_length\"\nsize_mm = 1886.6\n", "");
+  ASSERT_TRUE(none.ok()) << none.error().message;
+  const auto all = LoadCellConfig(kCell);
+  ASSERT_TRUE(all.ok());
+  EXPECT_EQ(all->part.odd_parts.size(), none->part.odd_parts.size() + 1);
+  const auto unknown = LoadChanged("dimension = \"total_length\"", "dimension = \"weight\"");
+  ASSERT_FALSE(unknown.ok());
+  EXPECT_THAT(unknown.error().message, HasSubstr("[[odd_part]] 0: dimension 'weight' is none of the axle"));
+  const auto no_text = LoadChanged("dimension = \"total_length\"", "dimension = 1");
+  ASSERT_FALSE(no_text.ok());
+  EXPECT_THAT(no_text.error().message, HasSubstr("dimension must be a text"));
+  const auto too_long = LoadChanged("size_mm = 1886.6", "size_mm = 3000.0");
+  ASSERT_FALSE(too_long.ok());
+  EXPECT_THAT(too_long.error().message, HasSubstr("total_length is 3000 mm, allowed"));
+}
+
 TEST(CellConfig, NamesFileKeyAndLimits) {
   const auto out_of_range = LoadChanged("baseline_mm = 250.0", "baseline_mm = 2.0");
   ASSERT_FALSE(out_of_range.ok());

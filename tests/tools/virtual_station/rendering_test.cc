@@ -78,6 +78,22 @@ TEST(Rendering, SameBytesOnAnyNumberOfThreads) {
   EXPECT_EQ(images[0], images[2]);
 }
 
+TEST(Rendering, AVisitOfItsOwnGivesAnImageOfItsOwn) {
+  const VirtualCell cell(Config(), 2);
+  const auto part = cell.Part(2);
+  ASSERT_TRUE(part.ok());
+  const auto image = [&](int visit) {
+    const auto view = cell.View(*part, 1, 15.0, visit);
+    EXPECT_TRUE(view.ok());
+    const auto map = cell.Map(*part, *view, Side::kLeft);
+    EXPECT_TRUE(map.ok());
+    return cell.Image(*map, *view, Side::kLeft, cell.Patterns(ProjectedSet::kReduced)[3], 3);
+  };
+  EXPECT_EQ(image(1), image(1));
+  EXPECT_NE(image(0), image(1));
+  EXPECT_NE(cell.View(*part, 1, 15.0, 0)->pyrometer_degc, cell.View(*part, 1, 15.0, 1)->pyrometer_degc);
+}
+
 TEST(Rendering, ForeignShareAsInThePaper) {
   const VirtualCell cell(Config(), 2);
   const auto part = cell.Part(0);
@@ -135,7 +151,7 @@ TEST(Rendering, NoiseHasTheSensorsVariance) {
   map.height = 64;
   map.sample.assign(512 * 64, {0.0f, 0.0f, 100.0f});
   const auto image =
-      ExposeImage(map, {config.projector_light, config.sensor, {}, {1, 2, 3, Side::kLeft, 4}, 1});
+      ExposeImage(map, {config.projector_light, config.sensor, {}, {1, 2, 3, 0, Side::kLeft, 4}, 1});
   double sum = 0, square = 0;
   for (const auto grey : image) {
     sum += grey;

@@ -67,6 +67,16 @@ TEST(Scene, WearMakesPlatesSmallerPartByPart) {
   EXPECT_NEAR(ActualSize(config, 7, 9).left_plate_width_mm, first + 9 * config.plate_wear_mm_per_part, 1e-9);
 }
 
+TEST(Scene, AnOddPartHasItsOneSizeAndTheOthersOfItsTurn) {
+  PartConfig config = Config().part;
+  config.odd_parts.clear();
+  const AxleSize even = ActualSize(config, 7, 3);
+  config.odd_parts = {{.part = 3, .size_mm = &AxleSize::total_length_mm, .mm = 1886.0}};
+  EXPECT_EQ(ActualSize(config, 7, 3).total_length_mm, 1886.0);
+  EXPECT_EQ(ActualSize(config, 7, 3).left_plate_width_mm, even.left_plate_width_mm);
+  EXPECT_NE(ActualSize(config, 7, 2).total_length_mm, 1886.0);
+}
+
 TEST(Station, WritesFilesAndTruth) {
   const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "virtual_station_test";
   const CellConfig config = Config();
@@ -85,6 +95,15 @@ TEST(Station, WritesFilesAndTruth) {
   EXPECT_EQ(truth["dimensions"].size(), 5u);
   EXPECT_DOUBLE_EQ(truth["dimensions"]["total_length"], part->size.total_length_mm);
   EXPECT_EQ(truth["views"].size(), config.views.size());
+  EXPECT_EQ(truth["verdict"], "OK");
+  const auto odd = cell.Part(6);  // an odd_part of the file
+  ASSERT_TRUE(odd.ok());
+  ASSERT_TRUE(WriteTruth(cell, *odd, (folder / "odd.json").string()).ok());
+  std::ifstream odd_stream(folder / "odd.json");
+  const auto odd_truth = nlohmann::json::parse(odd_stream);
+  EXPECT_EQ(odd_truth["verdict"], "NOT_OK");
+  EXPECT_EQ(odd_truth["limits"]["total_length"]["verdict"], "NOT_OK");
+  EXPECT_EQ(odd_truth["limits"]["left_plate_width"]["verdict"], "OK");
   EXPECT_FALSE(WriteTruth(cell, *part, "/nowhere/truth.json").ok());
   std::filesystem::remove_all(folder);
 }

@@ -54,7 +54,7 @@ struct GigeCounters {
   std::uint64_t image_errors = 0;
   std::uint64_t frames_sent = 0;
   std::uint64_t packets_sent = 0, packets_lost = 0, packets_refused = 0, packets_failed = 0;
-  std::uint64_t resends = 0, resends_unavailable = 0;  // batches of at most 32 packets
+  std::uint64_t resends = 0, resends_unavailable = 0;  // packets
   std::uint64_t commands = 0, commands_malformed = 0, commands_refused = 0, heartbeats_expired = 0;
 };
 

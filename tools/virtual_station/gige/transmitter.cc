@@ -147,7 +147,7 @@ void Transmitter::SendSome() {
   }
 }
 
-// Resends go before what waits; they take their time on the wire like everything else.
+// Resends go before what waits, at the pace of the wire like everything else.
 void Transmitter::ServeResend() {
   ResendRequest& request = resends_.front();
   const auto found = std::find_if(history_.begin(), history_.end(),
@@ -165,14 +165,14 @@ void Transmitter::ServeResend() {
     port_free_ns_ = std::max(port_free_ns_, MonoNowNs());
   }
   const std::int64_t begin_ns = port_free_ns_;
-  for (std::size_t i = 0; i < kBatch_packets && request.first_packet < end; ++i, ++request.first_packet) {
-    if (available) {
-      Add(batch, frame, MakePacket(frame, request.first_packet, PacketStatus::kResent));
-    } else {
-      Add(batch, frame, MakeUnavailable(request.block_id, request.first_packet));
-    }
+  for (std::size_t i = 0;
+       i < kBatch_packets && request.first_packet < end && port_free_ns_ <= begin_ns + kBatch_ns; ++i) {
+    const std::uint32_t packet = request.first_packet++;
+    Add(batch, frame,
+        available ? MakePacket(frame, packet, PacketStatus::kResent)
+                  : MakeUnavailable(request.block_id, packet));
+    ++(available ? counters_.packets_resent : counters_.resends_unavailable);
   }
-  ++(available ? counters_.packets_resent : counters_.resends_unavailable);
   SendPaced(batch, begin_ns);
   if (request.first_packet >= end) {
     resends_.pop_front();

@@ -30,12 +30,12 @@ struct TransmitterOptions {
 
 struct TransmitterCounters {
   std::uint64_t frames = 0;
-  std::uint64_t packets = 0;          // given to the system
-  std::uint64_t packets_lost = 0;     // by the fault knob
-  std::uint64_t packets_refused = 0;  // by the shared link
-  std::uint64_t packets_failed = 0;   // by the system
-  std::uint64_t packets_resent = 0;   // of `packets`
-  std::uint64_t resends_unavailable = 0;
+  std::uint64_t packets = 0;              // given to the system
+  std::uint64_t packets_lost = 0;         // by the fault knob
+  std::uint64_t packets_refused = 0;      // by the shared link
+  std::uint64_t packets_failed = 0;       // by the system
+  std::uint64_t packets_resent = 0;       // packets sent again, those that were lost again included
+  std::uint64_t resends_unavailable = 0;  // packets answered with "unavailable"
 };
 
 // Thread-safe. Holds 4 frames, the one being sent included, and the last 8 that went out.

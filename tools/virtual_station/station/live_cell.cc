@@ -26,9 +26,18 @@ std::int64_t MonotonicUs() {
   return now.tv_sec * 1'000'000 + now.tv_nsec / 1000;
 }
 
-std::uint64_t TagOf(int part, const TriggerSim::Edge& edge) {
-  return static_cast<std::uint64_t>(part) << 32 | static_cast<std::uint64_t>(edge.view) << 16 |
-         static_cast<std::uint64_t>(edge.right ? 1 : 0) << 8 | edge.pattern;
+constexpr int kVisits = 128;  // that a tag tells apart
+
+// Bits: part 32, view 16, visit 7, side 1, pattern 8.
+std::uint64_t TagOf(const ViewVisit& visit, const TriggerSim::Edge& edge) {
+  return static_cast<std::uint64_t>(visit.part) << 32 | static_cast<std::uint64_t>(visit.view) << 16 |
+         static_cast<std::uint64_t>(visit.visit) << 9 | static_cast<std::uint64_t>(edge.right ? 1 : 0) << 8 |
+         edge.pattern;
+}
+
+ViewVisit VisitOf(std::uint64_t tag) {
+  return {static_cast<int>(tag >> 32), static_cast<int>(tag >> 16 & 0xffff),
+          static_cast<int>(tag >> 9 & 0x7f)};
 }
 
 RobotSimConfig RobotOf(const CellConfig& config) {
@@ -116,7 +125,8 @@ void LiveCell::FollowLine() {
     part_ = static_cast<int>(part.part);
     in_place_us_ = now_us_;
     held_us_ = 0;
-    requested_view_ = -1;
+    followed_order_.reset();
+    visits_.clear();
     renderer_.PreparePart(part_);
     renderer_.PreparePart(part_ + 1);
   }
@@ -130,18 +140,26 @@ void LiveCell::FollowRobot(std::int64_t elapsed_us) {
       view >= static_cast<int>(cell_.config().views.size())) {
     return;
   }
-  if (view != requested_view_ && status.in_position == false) {
-    requested_view_ = view;
+  // Every order to go to a view is another visit, also to where the robot is. A move home from a view before
+  // the last looks the same; its picture is made for nothing.
+  if (status.seq_echo != followed_order_) {
+    followed_order_ = status.seq_echo;
+    ++visits_[view];
     const double move_s = static_cast<double>(RobotSimConfig().move_us) * 1e-6;
-    renderer_.Request(part_, view, PartAge() + move_s + kSettleAndHalfCaptureS);
+    renderer_.Request(LatestVisit(view), PartAge() + move_s + kSettleAndHalfCaptureS);
   }
-  const auto rendered = renderer_.Find(part_, view);
+  const auto rendered = renderer_.Find(LatestVisit(view));
   // The arm is held just short of the view while its picture is not there.
   robot_.SetFaults({.stuck = rendered == nullptr});
   if (rendered == nullptr && robot_.progress() >= 1.0) {
     held_us_ += elapsed_us;
     line_held_us_ += elapsed_us;
   }
+}
+
+ViewVisit LiveCell::LatestVisit(int view) const {
+  const auto found = visits_.find(view);
+  return {part_, view, found == visits_.end() ? 0 : (found->second - 1) % kVisits};
 }
 
 Status LiveCell::FollowSorting() {
@@ -164,14 +182,15 @@ Status LiveCell::FollowSorting() {
 }
 
 void LiveCell::OnEdge(const TriggerSim::Edge& edge) {
-  if (const auto rendered = renderer_.Find(part_, edge.view); rendered != nullptr) {
+  const ViewVisit visit = LatestVisit(edge.view);
+  if (const auto rendered = renderer_.Find(visit); rendered != nullptr) {
     taken_[part_].insert_or_assign(edge.view, rendered->state);
   }
-  cameras_[edge.right ? 1 : 0]->Edge(edge.utime * 1000, TagOf(part_, edge));
+  cameras_[edge.right ? 1 : 0]->Edge(edge.utime * 1000, TagOf(visit, edge));
 }
 
 std::shared_ptr<const GreyImage> LiveCell::ImageOf(std::uint64_t tag) const {
-  const auto rendered = renderer_.Find(static_cast<int>(tag >> 32), static_cast<int>(tag >> 16 & 0xffff));
+  const auto rendered = renderer_.Find(VisitOf(tag));
   const auto pattern = static_cast<std::size_t>(tag & 0xff);
   const auto side = static_cast<std::size_t>(tag >> 8 & 1);
   return rendered != nullptr && pattern < rendered->images[side].size() ? rendered->images[side][pattern]

@@ -5,6 +5,7 @@
 #include <array>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "drivers/can/can_bus.h"
@@ -42,6 +43,8 @@ class LiveCell {
   double PartTemperature(std::uint32_t part) const;
   void FollowLine();
   void FollowRobot(std::int64_t elapsed_us);
+  // The latest visit of a view of the part in place.
+  ViewVisit LatestVisit(int view) const;
   Status FollowSorting();
   void OnEdge(const TriggerSim::Edge& edge);
   std::shared_ptr<const GreyImage> ImageOf(std::uint64_t tag) const;
@@ -66,7 +69,8 @@ class LiveCell {
   std::int64_t in_place_us_ = 0;
   std::int64_t held_us_ = 0;                       // the thermal clock stood still: the renderer was behind
   std::int64_t line_held_us_ = 0;                  // the same for the line, over all parts
-  int requested_view_ = -1;                        // of part_
+  std::optional<std::uint16_t> followed_order_;    // of the robot: the last whose view was requested
+  std::map<int, int> visits_;                      // by view of part_: how often the robot went there
   std::map<int, std::map<int, ViewState>> taken_;  // by part and view: as rendered
   std::size_t sorted_ = 0;
 };

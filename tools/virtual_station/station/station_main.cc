@@ -12,6 +12,7 @@
 #include <sstream>
 
 #include "services/common/config/config.h"
+#include "tools/virtual_station/commissioning.h"
 #include "tools/virtual_station/station/live_cell.h"
 #include "tools/virtual_station/station_writer.h"
 #include "tools/virtual_station/whole_file.h"
@@ -42,7 +43,7 @@ Result<std::string> ReadText(const fs::path& path) {
 }
 
 // Copies the station and the cell into the run's folder and commissions the station: calibration, views,
-// model.
+// model, and what station.toml says of cameras and steel.
 Status Prepare(const Arguments& arguments) {
   const fs::path run(arguments.run), station(arguments.station);
   std::error_code problem;
@@ -54,9 +55,10 @@ Status Prepare(const Arguments& arguments) {
     cell_text = std::regex_replace(cell_text, std::regex("scale_divisor = \\d+"),
                                    fmt::format("scale_divisor = {}", arguments.scale_divisor));
   }
-  RETURN_IF_ERROR(WriteWholeFile((run / "station/station.toml").string(), station_text));
   RETURN_IF_ERROR(WriteWholeFile((run / "cell.toml").string(), cell_text));
   ASSIGN_OR_RETURN(const CellConfig config, LoadCellConfig((run / "cell.toml").string()));
+  ASSIGN_OR_RETURN(const std::string commissioned, CommissionedStation(config, station_text));
+  RETURN_IF_ERROR(WriteWholeFile((run / "station/station.toml").string(), commissioned));
   return WriteStation(config, ProjectedSet::kReduced, (run / "station").string());
 }
 

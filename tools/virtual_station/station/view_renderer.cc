@@ -31,19 +31,20 @@ void ViewRenderer::PreparePart(int part) {
   wake_.notify_one();
 }
 
-void ViewRenderer::Request(int part, int view, double time_s) {
+void ViewRenderer::Request(const ViewVisit& visit, double time_s) {
   {
     const std::lock_guard lock(mutex_);
-    jobs_.push_back({part, view, time_s});
+    jobs_.push_back({visit.part, visit, time_s});
   }
   wake_.notify_one();
 }
 
-std::shared_ptr<const RenderedView> ViewRenderer::Find(int part, int view) const {
+std::shared_ptr<const RenderedView> ViewRenderer::Find(const ViewVisit& visit) const {
   const std::lock_guard lock(mutex_);
-  for (auto found = views_.rbegin(); found != views_.rend(); ++found) {
-    if ((*found)->state.part == part && (*found)->state.view == view) {
-      return *found;
+  for (const auto& rendered : views_) {
+    const ViewState& state = rendered->state;
+    if (ViewVisit{state.part, state.view, state.visit} == visit) {
+      return rendered;
     }
   }
   return nullptr;
@@ -84,7 +85,7 @@ void ViewRenderer::Do(const Job& job) {
   const auto part = EnsurePart(job.part);
   std::optional<Error> failed = part.ok() ? std::nullopt : std::optional(part.error());
   std::shared_ptr<const RenderedView> rendered;
-  if (part.ok() && job.view.has_value()) {
+  if (part.ok() && job.visit.has_value()) {
     const auto view = Render(**part, job);
     failed = view.ok() ? std::nullopt : std::optional(view.error());
     rendered = view.ok() ? *view : nullptr;
@@ -118,7 +119,7 @@ Result<std::shared_ptr<const PartState>> ViewRenderer::EnsurePart(int part) {
 Result<std::shared_ptr<const RenderedView>> ViewRenderer::Render(const PartState& part,
                                                                  const Job& job) const {
   auto rendered = std::make_shared<RenderedView>();
-  ASSIGN_OR_RETURN(rendered->state, cell_.View(part, *job.view, job.time_s));
+  ASSIGN_OR_RETURN(rendered->state, cell_.View(part, job.visit->view, job.time_s, job.visit->visit));
   for (const Side side : {Side::kLeft, Side::kRight}) {
     ASSIGN_OR_RETURN(const GeometryMap map, cell_.Map(part, rendered->state, side));
     auto& images = rendered->images[side == Side::kLeft ? 0 : 1];

@@ -17,7 +17,13 @@ namespace forgescan {
 
 using GreyImage = std::vector<std::uint8_t>;
 
-// All images of one view, in the order of projection.
+// A view of a part, taken for the first time (0) or again.
+struct ViewVisit {
+  int part = 0, view = 0, visit = 0;
+  bool operator==(const ViewVisit&) const = default;
+};
+
+// All images of one visit, in the order of projection.
 struct RenderedView {
   ViewState state;
   std::array<std::vector<std::shared_ptr<const GreyImage>>, 2> images;  // left, right
@@ -34,9 +40,9 @@ class ViewRenderer {
   // Prepares the part's mesh; costs the worker 0.3 s that the first view then does not wait for.
   void PreparePart(int part);
   // `time_s`: of the exposure, after the part had its start temperature.
-  void Request(int part, int view, double time_s);
+  void Request(const ViewVisit& visit, double time_s);
   // Null while it is not rendered, and again when newer views have taken its place.
-  std::shared_ptr<const RenderedView> Find(int part, int view) const;
+  std::shared_ptr<const RenderedView> Find(const ViewVisit& visit) const;
   // The part, when it is prepared; null before.
   std::shared_ptr<const PartState> Part(int part) const;
   // The first thing that went wrong; ok = nothing.
@@ -45,7 +51,7 @@ class ViewRenderer {
  private:
   struct Job {
     int part;
-    std::optional<int> view;  // none = only the part
+    std::optional<ViewVisit> visit;  // none = only the part
     double time_s;
   };
   void Work();
