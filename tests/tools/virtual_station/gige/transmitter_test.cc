@@ -41,10 +41,10 @@ std::int64_t PacketNs(const GvspFrame& frame) {
 
 class TransmitterTest : public ::testing::Test {
  protected:
-  // Waits until `packets` more have left. At no time may more have left than the wire could carry.
-  void ExpectPaced(std::uint64_t packets, std::int64_t packet_ns) {
+  // Waits until `packets` more have left. At no time may more have left than the wire could carry since
+  // `start_ns`.
+  void ExpectPaced(std::int64_t start_ns, std::uint64_t packets, std::int64_t packet_ns) {
     const std::uint64_t before = done_;
-    const std::int64_t start_ns = MonoNowNs();
     std::int64_t ahead_ns = 0;
     while (done_ < before + packets && MonoNowNs() < start_ns + kPatience_ns) {
       std::this_thread::yield();
@@ -63,27 +63,32 @@ class TransmitterTest : public ::testing::Test {
 };
 
 TEST_F(TransmitterTest, AFrameKeepsThePaceOfTheWire) {
+  const std::int64_t start_ns = MonoNowNs();
   const auto frame = FrameTo(receiver_);
   ASSERT_TRUE(transmitter_.Submit(frame));
-  ExpectPaced(frame->packets(), PacketNs(*frame));
+  ExpectPaced(start_ns, frame->packets(), PacketNs(*frame));
 }
 
 TEST_F(TransmitterTest, ResendsKeepThePaceOfTheWire) {
+  const std::int64_t start_ns = MonoNowNs();
   const auto frame = FrameTo(receiver_);
   ASSERT_TRUE(transmitter_.Submit(frame));
-  ExpectPaced(frame->packets(), PacketNs(*frame));
+  ExpectPaced(start_ns, frame->packets(), PacketNs(*frame));
+  const std::int64_t resend_ns = MonoNowNs();
   transmitter_.RequestResend({.block_id = 7, .first_packet = 0, .last_packet = frame->packets() - 1});
-  ExpectPaced(frame->packets(), PacketNs(*frame));
+  ExpectPaced(resend_ns, frame->packets(), PacketNs(*frame));
   EXPECT_EQ(transmitter_.counters().packets_resent, frame->packets());
 }
 
 TEST_F(TransmitterTest, ResendsAndTheNextFrameShareTheWire) {
+  const std::int64_t start_ns = MonoNowNs();
   const auto frame = FrameTo(receiver_);
   ASSERT_TRUE(transmitter_.Submit(frame));
-  ExpectPaced(frame->packets(), PacketNs(*frame));
+  ExpectPaced(start_ns, frame->packets(), PacketNs(*frame));
+  const std::int64_t second_ns = MonoNowNs();
   ASSERT_TRUE(transmitter_.Submit(FrameTo(receiver_)));
   transmitter_.RequestResend({.block_id = 7, .first_packet = 1, .last_packet = 200});
-  ExpectPaced(frame->packets() + 200, PacketNs(*frame));
+  ExpectPaced(second_ns, frame->packets() + 200, PacketNs(*frame));
 }
 
 }  // namespace
