@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <filesystem>
 
 #include "services/common/bus/channels.h"
 #include "services/report/judge_dimensions.h"
@@ -31,15 +30,7 @@ Result<std::shared_ptr<ReportService>> ReportService::Create(StreamHub& hub, Ser
                                                              const ReportStation& station,
                                                              const PartEvaluator& evaluator) {
   RETURN_IF_ERROR(config.Check());
-  std::error_code failure;
-  std::filesystem::create_directories(station.results_folder, failure);
-  if (failure) {
-    return Fail(ErrorCode::kIo, "cannot make the results folder {}: {}", station.results_folder,
-                failure.message());
-  }
-  const std::string path = (std::filesystem::path(station.results_folder) / "history.sqlite").string();
-  ASSIGN_OR_RETURN(History history, History::Open(path));
-  ReportWriter writer(station.results_folder, std::move(history), config);
+  ASSIGN_OR_RETURN(ReportWriter writer, ReportWriter::Open(station.results_folder, config));
   return std::shared_ptr<ReportService>(
       new ReportService(hub, monitor, {config, station, std::move(writer)}, evaluator));
 }
@@ -169,9 +160,13 @@ void ReportService::OnLoss(bool PartInWork::*hole) {
 }
 
 void ReportService::CheckLossesLater() {
-  hub_.bus().Cancel(loss_timer_);
-  loss_timer_ =
-      hub_.bus().At(hub_.bus().NowUs() + Us(config_.loss_settle_s), [this] { FinishWhatWaitsInVain(); });
+  if (loss_timer_ != 0) {
+    return;  // further losses must not put the look off
+  }
+  loss_timer_ = hub_.bus().At(hub_.bus().NowUs() + Us(config_.loss_settle_s), [this] {
+    loss_timer_ = 0;
+    FinishWhatWaitsInVain();
+  });
 }
 
 PartInWork* ReportService::Find(int part, std::int64_t utime) {

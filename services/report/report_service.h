@@ -33,8 +33,7 @@ struct ReportStation {
 
 class ReportService {
  public:
-  // `evaluator` outlives the service. Errors: as ReportConfig::Check and History::Open; kIo if the results
-  // folder cannot be made.
+  // `evaluator` outlives the service. Errors: as ReportConfig::Check and ReportWriter::Open.
   static Result<std::shared_ptr<ReportService>> Create(StreamHub& hub, ServiceMonitor& monitor,
                                                        const ReportConfig& config,
                                                        const ReportStation& station,
@@ -100,7 +99,7 @@ class ReportService {
   CloudAssembler assembler_;
   std::map<int, Open> open_;           // by part
   std::deque<FinishedPart> finished_;  // the last ones, oldest first
-  Bus::TimerId loss_timer_ = 0;
+  Bus::TimerId loss_timer_ = 0;        // 0 = none set
 };
 
 }  // namespace forgescan

@@ -43,6 +43,17 @@ std::string ReportFolderName(int part, std::int64_t utime) {
   return fmt::format("{}-part-{:06}", UtcFileText(utime), part);
 }
 
+Result<ReportWriter> ReportWriter::Open(const std::string& results_folder, const ReportConfig& config) {
+  std::error_code failure;
+  std::filesystem::create_directories(results_folder, failure);
+  if (failure) {
+    return Fail(ErrorCode::kIo, "cannot make the results folder {}: {}", results_folder, failure.message());
+  }
+  const std::string path = (std::filesystem::path(results_folder) / "history.sqlite").string();
+  ASSIGN_OR_RETURN(History history, History::Open(path));
+  return ReportWriter(results_folder, std::move(history), config);
+}
+
 ReportWriter::ReportWriter(std::string results_folder, History history, const ReportConfig& config)
     : results_folder_(std::move(results_folder)), history_(std::move(history)), config_(config) {}
 

@@ -17,7 +17,8 @@ std::string ReportFolderName(int part, std::int64_t utime);
 
 class ReportWriter {
  public:
-  ReportWriter(std::string results_folder, History history, const ReportConfig& config);
+  // Makes the folder if there is none. Errors: kIo (it cannot be made); as History::Open.
+  static Result<ReportWriter> Open(const std::string& results_folder, const ReportConfig& config);
 
   // Appends the part to the history. Errors: as History::Append.
   Status Remember(const PartReport& report, std::int64_t utime);
@@ -30,6 +31,8 @@ class ReportWriter {
   Status WriteIndex(const std::string& station) const;
 
  private:
+  ReportWriter(std::string results_folder, History history, const ReportConfig& config);
+
   std::string results_folder_;
   History history_;
   ReportConfig config_;

@@ -82,5 +82,25 @@ TEST_F(ReportLossesTest, ARegistrationAfterTheLossEndsThePartToo) {
   EXPECT_EQ(VerdictOn(1), fsmsg::verdict_t::VERDICT_NOT_INSPECTED);
 }
 
+TEST_F(ReportLossesTest, FurtherLossesDoNotPutTheVerdictOff) {
+  StreamHub fusion(network_.AddNode(), "fusion", {.history_bytes = 1});  // keeps one message
+  fusion.Advertise(kFusionResult);
+  Arrive(1);
+  network_.RunFor(kSecondUs);
+  SendCloud(1);
+  SendRegistration(1, fsmsg::registration_t::STATUS_CONVERGED);
+  network_.RunFor(kSecondUs);
+  for (int i = 0; i < 8; ++i) {
+    network_.SetFaults({.loss = 1.0});
+    ASSERT_TRUE(fusion.Publish(kFusionResult, Fusion(i == 0 ? 1 : 100 + i)).ok());
+    network_.RunFor(1000);
+    network_.SetFaults({});
+    ASSERT_TRUE(fusion.Publish(kFusionResult, Fusion(200 + i)).ok());
+    network_.RunFor(1'300'000);  // sooner than the service looks, and not in step with it
+  }
+  EXPECT_EQ(monitor_.counter("holes"), 8);
+  EXPECT_EQ(VerdictOn(1), fsmsg::verdict_t::VERDICT_OK);
+}
+
 }  // namespace
 }  // namespace forgescan
