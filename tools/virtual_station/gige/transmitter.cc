@@ -161,8 +161,11 @@ void Transmitter::ServeResend() {
   const std::uint32_t end =
       std::min(request.last_packet + 1, available ? frame.packets() : request.last_packet + 1);
   Batch batch;
-  if (!active_ && waiting_.empty()) {  // else the resend takes its turn in a schedule that may be behind
-    port_free_ns_ = std::max(port_free_ns_, MonoNowNs());
+  if (!active_) {  // with a frame on its way, or due, the resend takes its turn in a schedule that may be
+                   // behind
+    const std::int64_t now_ns = MonoNowNs();
+    port_free_ns_ =
+        std::max(port_free_ns_, waiting_.empty() ? now_ns : std::min(now_ns, waiting_.front()->ready_ns));
   }
   const std::int64_t begin_ns = port_free_ns_;
   for (std::size_t i = 0;
