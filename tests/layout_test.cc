@@ -1,5 +1,5 @@
-// Holds the layout and the include rules of CONTRIBUTING.md: who may include whom, where time and vendors may be named, how
-// long a file may be.
+// Holds the layout and the include rules of CONTRIBUTING.md: who may include whom, where time and vendors may
+// be named, how long a file may be.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -95,7 +95,8 @@ TEST(Layout, DriversKnowNoMessagesAndNoServices) {
 TEST(Layout, ProductDoesNotIncludeToolsOrTests) {
   ForEachInclude([](const std::string& path, const std::string& include) {
     if (StartsWith(path, "services/") || StartsWith(path, "drivers/")) {
-      EXPECT_FALSE(StartsWith(include, "tools/") || StartsWith(include, "tests/")) << path << " includes " << include;
+      EXPECT_FALSE(StartsWith(include, "tools/") || StartsWith(include, "tests/"))
+          << path << " includes " << include;
     }
   });
 }
@@ -111,7 +112,8 @@ TEST(Layout, TheSimulatorKnowsNoServiceAndNoMessage) {
 }
 
 TEST(Layout, ConcreteBusAndDriversOnlyInMain) {
-  static const std::regex concrete("^drivers/\\w+/\\w+_(aravis|socketcan|udp|canopen|sim)\\.h$|/lcm_bus\\.h$");
+  static const std::regex concrete(
+      "^drivers/\\w+/\\w+_(aravis|socketcan|udp|canopen|sim)\\.h$|/lcm_bus\\.h$");
   ForEachInclude([](const std::string& path, const std::string& include) {
     const std::string name = fs::path(path).filename();
     const bool service = !ServiceOf(path).empty() && !StartsWith(path, "services/common/");
@@ -132,7 +134,8 @@ TEST(Layout, VendorHeadersStayInTheirFiles) {
       {std::regex("^linux/can"), std::regex("^drivers/can/can_socketcan\\.cc$")},
       {std::regex("^sqlite3\\.h$"), std::regex("^services/report/|^tests/services/report/")},
       {std::regex("^embree"), std::regex("^tools/virtual_station/\\w+\\.cc$")},
-      {std::regex("^(BRep|TopoDS|STEP|XCAF|gp_)"), std::regex("\\.cc$|_shape\\.h$")},  // private headers of shapes
+      {std::regex("^(BRep|TopoDS|STEP|XCAF|gp_)"),
+       std::regex("\\.cc$|_shape\\.h$")},  // private headers of shapes
   };
   ForEachInclude([&rules](const std::string& path, const std::string& include) {
     for (const Rule& rule : rules) {
@@ -144,10 +147,10 @@ TEST(Layout, VendorHeadersStayInTheirFiles) {
 }
 
 TEST(Layout, OneClock) {
-  static const std::regex clock("(system_clock|steady_clock|high_resolution_clock)::now|sleep_for|sleep_until|\\busleep\\(");
+  static const std::regex clock(
+      "(system_clock|steady_clock|high_resolution_clock)::now|sleep_for|sleep_until|\\busleep\\(");
   // The clock itself, hardware and simulators that run in real time, and tests.
-  static const std::regex allowed(
-      "^services/common/clock/|^drivers/|^tools/|^tests/");
+  static const std::regex allowed("^services/common/clock/|^drivers/|^tools/|^tests/");
   for (const File& file : Sources()) {
     for (const std::string& line : file.lines) {
       if (std::regex_search(line, clock)) {
@@ -165,7 +168,7 @@ TEST(Layout, FilesAndMainsAreShort) {
 }
 
 TEST(Layout, EveryServiceHasItsPageAndItsMain) {
-  const std::set<std::string> services = {"trigger", "camera", "robot",        "cooling",
+  const std::set<std::string> services = {"trigger",        "camera", "robot",        "cooling",
                                           "reconstruction", "fusion", "registration", "report"};
   for (const std::string& name : services) {
     for (const char* file : {"README.md", "main.cc"}) {
@@ -182,7 +185,8 @@ TEST(Layout, EverySourceIsInTheBuild) {
     }
     const fs::path source = kSource / file.path;
     bool listed = false;
-    for (fs::path folder = source.parent_path(); !listed && folder != kSource.parent_path(); folder = folder.parent_path()) {
+    for (fs::path folder = source.parent_path(); !listed && folder != kSource.parent_path();
+         folder = folder.parent_path()) {
       std::ifstream stream(folder / "CMakeLists.txt");
       const std::string text{std::istreambuf_iterator<char>(stream), {}};
       listed = text.find(fs::relative(source, folder).string()) != std::string::npos;

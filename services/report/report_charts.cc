@@ -192,8 +192,8 @@ std::string TrendSentence(const ReportedTrend& trend) {
   }
   return *trend.parts_to_limit == 0
              ? fmt::format("Trend {}; the next part may pass the {} limit.", slope, limit)
-             : fmt::format("Trend {}; {} {} to the {} limit (95\u00a0%).", slope,
-                           *trend.parts_to_limit, *trend.parts_to_limit == 1 ? "part" : "parts", limit);
+             : fmt::format("Trend {}; {} {} to the {} limit (95\u00a0%).", slope, *trend.parts_to_limit,
+                           *trend.parts_to_limit == 1 ? "part" : "parts", limit);
 }
 
 }  // namespace forgescan

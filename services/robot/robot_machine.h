@@ -95,7 +95,8 @@ class RobotMachine {
   bool Echoed(const RobotStatus& status) const;
   std::string WhyNot() const;
   Actions Start(std::int64_t now_us);
-  // A part that leaves without having been taken up still gets its story: started, and aborted with the reason.
+  // A part that leaves without having been taken up still gets its story: started, and aborted with the
+  // reason.
   Actions PassBy(std::int64_t now_us);
   Actions Order(RobotOrder order, std::int64_t now_us);
   Actions Abort(const std::string& reason, std::int64_t now_us);

@@ -111,7 +111,8 @@ TEST(ChannelList, StreamTypesBeginWithTheStreamHeader) {
   for (const auto& [channel, row] : RowsOfReadme()) {
     if (row.kind == "stream") {
       const std::string text = ReadAll(kSource / "lcmtypes" / (row.type + ".lcm"));
-      const std::regex header(R"(\{\s+int64_t utime;.*\n\s+int64_t session;.*\n\s+int64_t sequence;.*\n\s+int32_t crc32;)");
+      const std::regex header(
+          R"(\{\s+int64_t utime;.*\n\s+int64_t session;.*\n\s+int64_t sequence;.*\n\s+int32_t crc32;)");
       EXPECT_TRUE(std::regex_search(text, header)) << row.type;
     }
   }

@@ -67,7 +67,8 @@ TEST(Config, UnknownKeyIsNamedWithItsLine) {
   root.Required("a", a, 0, 9);
   const Status status = root.Finish();
   ASSERT_FALSE(status.ok());
-  EXPECT_THAT(status.error().message, AllOf(HasSubstr("line 2"), HasSubstr("gian"), HasSubstr("known here: a")));
+  EXPECT_THAT(status.error().message,
+              AllOf(HasSubstr("line 2"), HasSubstr("gian"), HasSubstr("known here: a")));
 }
 
 TEST(Config, NotANumberAndNaNAreRefused) {

@@ -64,7 +64,7 @@ class RealLine : public ::testing::TestWithParam<const char*> {
 TEST_P(RealLine, InspectsAnAxle) {
   const Output output =
       Call(std::string(FORGESCAN_BIN_DIR) + "/forgescan inspect --scale-divisor 4 --station " +
-          (folder_ / "station").string() + " --out " + (folder_ / "runs").string());
+           (folder_ / "station").string() + " --out " + (folder_ / "runs").string());
   ASSERT_EQ(output.exit_code, 0) << output.text;
   std::smatch match;
   ASSERT_TRUE(std::regex_search(output.text, match, std::regex("\nreport (.+)\n$"))) << output.text;
@@ -101,7 +101,7 @@ INSTANTIATE_TEST_SUITE_P(Buffers, RealLine, ::testing::Values("104857600", "1064
 TEST(Inspect, SaysWhatIsWrong) {
   const Output output =
       Call(std::string(FORGESCAN_BIN_DIR) + "/forgescan inspect --station " + FORGESCAN_SOURCE_DIR +
-          "/docs --out " + ::testing::TempDir() + "forgescan_line_wrong");
+           "/docs --out " + ::testing::TempDir() + "forgescan_line_wrong");
   EXPECT_NE(output.exit_code, 0);
   EXPECT_NE(output.text.find("station.toml: cannot be read"), std::string::npos) << output.text;
   fs::remove_all(::testing::TempDir() + "forgescan_line_wrong");

@@ -1,5 +1,5 @@
-// The subcommands of the forgescan tool. Each Add...Command adds itself to the program; when the user calls it, its outcome
-// is stored, and main() turns it into the exit code: 0 only for a trustworthy result.
+// The subcommands of the forgescan tool. Each Add...Command adds itself to the program; when the user calls
+// it, its outcome is stored, and main() turns it into the exit code: 0 only for a trustworthy result.
 #pragma once
 
 #include <CLI/CLI.hpp>

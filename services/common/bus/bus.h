@@ -1,7 +1,9 @@
-// The bus as every service sees it: raw messages by channel, the time, and timers. One contract suite holds the
-// implementations equal: LcmBus (processes, UDP multicast) and SimBus (one process, simulated time, seeded faults).
+// The bus as every service sees it: raw messages by channel, the time, and timers. One contract suite holds
+// the implementations equal: LcmBus (processes, UDP multicast) and SimBus (one process, simulated time,
+// seeded faults).
 //
-// Threads: everything is called, and every handler runs, on the one thread that runs the bus. Handlers must not throw.
+// Threads: everything is called, and every handler runs, on the one thread that runs the bus. Handlers must
+// not throw.
 #pragma once
 
 #include <cstdint>
@@ -19,8 +21,8 @@ namespace forgescan {
 using Bytes = std::vector<std::uint8_t>;
 using ByteView = std::span<const std::uint8_t>;
 
-// A message larger than this is refused: one 8-bit frame of 2448 x 2048 fits, anything larger travels in slices, because
-// LCM reassembles in a fixed store of 16 MB and evicts in silence.
+// A message larger than this is refused: one 8-bit frame of 2448 x 2048 fits, anything larger travels in
+// slices, because LCM reassembles in a fixed store of 16 MB and evicts in silence.
 inline constexpr std::size_t kMaxMessageBytes = 5'500'000;
 
 struct BusHealth {
@@ -35,14 +37,17 @@ class Bus : public Clock {
   using TimerId = std::uint64_t;
 
   // Sends to every subscriber of the channel in every process, this one included.
-  // Errors: kInvalidArgument (too large, channel name empty or over 63 characters), kIo (the network refused).
+  // Errors: kInvalidArgument (too large, channel name empty or over 63 characters), kIo (the network
+  // refused).
   virtual Status Publish(std::string_view channel, ByteView message) = 0;
-  // Delivery is unreliable and unordered, as the network's; see StreamHub for streams that are complete and in order.
+  // Delivery is unreliable and unordered, as the network's; see StreamHub for streams that are complete and
+  // in order.
   virtual void Subscribe(const std::string& channel, MessageHandler handler) = 0;
 
   // Runs the handler once, not before `utime`. Timers due at the same time run in the order they were set.
   virtual TimerId At(std::int64_t utime, TimerHandler handler) = 0;
-  // Runs the handler every `period_us`, first after one period; periods that were missed are skipped, not made up for.
+  // Runs the handler every `period_us`, first after one period; periods that were missed are skipped, not
+  // made up for.
   virtual TimerId Every(std::int64_t period_us, TimerHandler handler) = 0;
   virtual void Cancel(TimerId timer) = 0;
 

@@ -1,5 +1,5 @@
-// Every channel of the bus, once: name and type here, sender, receivers, rate and size in lcmtypes/README.md, and a test
-// holds the two lists together.
+// Every channel of the bus, once: name and type here, sender, receivers, rate and size in lcmtypes/README.md,
+// and a test holds the two lists together.
 #pragma once
 
 #include "fsmsg/cloud_slice_t.hpp"

@@ -1,6 +1,7 @@
 // The bus between processes: LCM over UDP multicast. The only place that knows LCM's library.
 //
-// One bus is one UDP port (LCM 1.3.1 binds to every address: the same port with another group is the same bus).
+// One bus is one UDP port (LCM 1.3.1 binds to every address: the same port with another group is the same
+// bus).
 #pragma once
 
 #include <map>
@@ -13,7 +14,8 @@ struct _lcm_t;
 
 namespace forgescan {
 
-// Kernel buffer for one whole view (16 frames of 5 MB) and what comes with it, so that a process may be away for that long.
+// Kernel buffer for one whole view (16 frames of 5 MB) and what comes with it, so that a process may be away
+// for that long.
 inline constexpr int kWantedReceiveBufferBytes = 200'000'000;
 
 class LcmBus final : public Bus {
@@ -31,7 +33,8 @@ class LcmBus final : public Bus {
   void Cancel(TimerId timer) override;
   BusHealth Health() const override;
 
-  // Also waits for this file descriptor and calls the handler when it is readable (devices of the same process).
+  // Also waits for this file descriptor and calls the handler when it is readable (devices of the same
+  // process).
   void Watch(int fd, std::function<void()> handler);
   // Runs handlers until Stop() is called. Errors: kIo (polling failed).
   Status Run();

@@ -22,8 +22,8 @@ bool IsUdpOnPort(int fd, int port) {
   }
   sockaddr_in address{};
   length = sizeof address;
-  return getsockname(fd, reinterpret_cast<sockaddr*>(&address), &length) == 0 && address.sin_family == AF_INET &&
-         ntohs(address.sin_port) == port;
+  return getsockname(fd, reinterpret_cast<sockaddr*>(&address), &length) == 0 &&
+         address.sin_family == AF_INET && ntohs(address.sin_port) == port;
 }
 
 }  // namespace
@@ -40,7 +40,8 @@ Result<LcmSocket> FindLcmSocket(int port) {
     LcmSocket socket;
     socklen_t length = sizeof socket.receive_buffer_bytes;
     struct stat status {};
-    if (getsockopt(fd, SOL_SOCKET, SO_RCVBUF, &socket.receive_buffer_bytes, &length) == 0 && fstat(fd, &status) == 0) {
+    if (getsockopt(fd, SOL_SOCKET, SO_RCVBUF, &socket.receive_buffer_bytes, &length) == 0 &&
+        fstat(fd, &status) == 0) {
       socket.inode = status.st_ino;
       return socket;
     }

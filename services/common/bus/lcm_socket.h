@@ -15,7 +15,8 @@ struct LcmSocket {
 // Finds this process's UDP socket bound to the port. Errors: kNotFound.
 Result<LcmSocket> FindLcmSocket(int port);
 
-// Datagrams the kernel has dropped at the socket since it was opened (last column of /proc/net/udp); 0 if it is gone.
+// Datagrams the kernel has dropped at the socket since it was opened (last column of /proc/net/udp); 0 if it
+// is gone.
 std::int64_t SocketDrops(std::uint64_t inode);
 
 }  // namespace forgescan

@@ -32,7 +32,8 @@ void SimNetwork::Send(const std::string& channel, ByteView message) {
     const int copies = Happens(random_, faults_.duplicate) ? 2 : 1;
     for (int copy = 0; copy < copies; ++copy) {
       const std::int64_t jitter =
-          faults_.jitter_us > 0 ? std::uniform_int_distribution<std::int64_t>(0, faults_.jitter_us)(random_) : 0;
+          faults_.jitter_us > 0 ? std::uniform_int_distribution<std::int64_t>(0, faults_.jitter_us)(random_)
+                                : 0;
       events_.Add(now_us_ + faults_.latency_us + jitter, 0,
                   [this, to = node.get(), channel, shared] { Deliver(to, channel, shared); });
     }
@@ -40,7 +41,8 @@ void SimNetwork::Send(const std::string& channel, ByteView message) {
 }
 
 void SimNetwork::Deliver(SimBus* node, const std::string& channel, std::shared_ptr<const Bytes> message) {
-  const bool alive = std::any_of(nodes_.begin(), nodes_.end(), [node](const auto& held) { return held.get() == node; });
+  const bool alive =
+      std::any_of(nodes_.begin(), nodes_.end(), [node](const auto& held) { return held.get() == node; });
   if (!alive) {
     return;
   }

@@ -1,6 +1,6 @@
-// The bus in one process and in simulated time: tests of services and of the whole line run on it, as fast as the machine
-// allows and the same every time. A SimNetwork carries the messages between its SimBus nodes, one node a service; it can
-// lose, duplicate, delay and reorder them like the real one, from a seed.
+// The bus in one process and in simulated time: tests of services and of the whole line run on it, as fast as
+// the machine allows and the same every time. A SimNetwork carries the messages between its SimBus nodes, one
+// node a service; it can lose, duplicate, delay and reorder them like the real one, from a seed.
 #pragma once
 
 #include <map>
@@ -14,11 +14,11 @@
 namespace forgescan {
 
 struct SimFaults {
-  double loss = 0.0;               // probability that a receiver does not get a message, 0..1
-  double large_loss = 0.0;         // the same for messages over one datagram (64 kB), in place of `loss`
-  double duplicate = 0.0;          // probability that it gets it twice, 0..1
-  std::int64_t latency_us = 200;   // of every delivery
-  std::int64_t jitter_us = 0;      // uniform, on top; larger than the gap between messages = they overtake
+  double loss = 0.0;              // probability that a receiver does not get a message, 0..1
+  double large_loss = 0.0;        // the same for messages over one datagram (64 kB), in place of `loss`
+  double duplicate = 0.0;         // probability that it gets it twice, 0..1
+  std::int64_t latency_us = 200;  // of every delivery
+  std::int64_t jitter_us = 0;     // uniform, on top; larger than the gap between messages = they overtake
 };
 
 class SimBus;

@@ -38,8 +38,8 @@ std::uint32_t CrcWithoutItself(ByteView message) {
 
 Status StampStreamHeader(Bytes& message, const StreamHeader& header) {
   if (message.size() < kStreamHeaderBytes) {
-    return Fail(ErrorCode::kInvalidArgument, "a stream message has at least {} bytes, not {}", kStreamHeaderBytes,
-                message.size());
+    return Fail(ErrorCode::kInvalidArgument, "a stream message has at least {} bytes, not {}",
+                kStreamHeaderBytes, message.size());
   }
   Put(message, kSessionAt, header.session);
   Put(message, kSequenceAt, header.sequence);

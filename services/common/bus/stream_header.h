@@ -1,5 +1,5 @@
-// The fields every stream message begins with, at fixed places of its encoded bytes, so that a stream can stamp and check
-// any type without knowing it:
+// The fields every stream message begins with, at fixed places of its encoded bytes, so that a stream can
+// stamp and check any type without knowing it:
 //   bytes 0..7 LCM fingerprint, 8..15 utime, 16..23 session, 24..31 sequence, 32..35 crc32; all big-endian.
 // crc32 is the CRC-32 (IEEE 802.3) of the whole encoded message with bytes 32..35 zero.
 #pragma once

@@ -10,7 +10,8 @@
 
 namespace forgescan {
 
-StreamSender::StreamSender(Bus& bus, std::string sender, const StreamOptions& options, StreamCounters& counters)
+StreamSender::StreamSender(Bus& bus, std::string sender, const StreamOptions& options,
+                           StreamCounters& counters)
     : bus_(bus),
       sender_(std::move(sender)),
       options_(options),
@@ -77,8 +78,9 @@ const Bytes* StreamSender::Find(const std::string& channel, std::int64_t sequenc
   }
   const std::int64_t index = sequence - found->second.first;
   const auto& messages = found->second.messages;
-  return index >= 0 && index < static_cast<std::int64_t>(messages.size()) ? messages[static_cast<std::size_t>(index)].get()
-                                                                          : nullptr;
+  return index >= 0 && index < static_cast<std::int64_t>(messages.size())
+             ? messages[static_cast<std::size_t>(index)].get()
+             : nullptr;
 }
 
 void StreamSender::OnRequest(const fsmsg::resend_request_t& request) {
@@ -87,8 +89,9 @@ void StreamSender::OnRequest(const fsmsg::resend_request_t& request) {
     return;  // another sender's, or no longer kept: the next status says so
   }
   ++counters_.resent;
-  const auto count = static_cast<std::int32_t>((message->size() + static_cast<std::size_t>(options_.piece_bytes) - 1) /
-                                               static_cast<std::size_t>(options_.piece_bytes));
+  const auto count =
+      static_cast<std::int32_t>((message->size() + static_cast<std::size_t>(options_.piece_bytes) - 1) /
+                                static_cast<std::size_t>(options_.piece_bytes));
   const bool idle = queue_.empty();
   const auto add = [&](std::int32_t piece) {
     Piece wanted{request.channel, request.sequence, piece};

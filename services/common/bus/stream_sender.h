@@ -1,4 +1,5 @@
-// The sending half of the resend protocol: numbers messages, keeps the newest, and sends pieces of them again on request.
+// The sending half of the resend protocol: numbers messages, keeps the newest, and sends pieces of them again
+// on request.
 #pragma once
 
 #include <deque>

@@ -12,7 +12,8 @@ class Clock {
   virtual std::int64_t NowUs() const = 0;
 };
 
-// The host's time of day at construction, continued by its steady clock: an NTP step does not reach the services.
+// The host's time of day at construction, continued by its steady clock: an NTP step does not reach the
+// services.
 class RealClock final : public Clock {
  public:
   RealClock();

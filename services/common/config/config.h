@@ -1,14 +1,16 @@
-// Reads a TOML file into the config structs of the services: every key is either read or an error, every number has limits.
+// Reads a TOML file into the config structs of the services: every key is either read or an error, every
+// number has limits.
 //
 //   ASSIGN_OR_RETURN(ConfigFile file, ConfigFile::Load(path));
 //   ConfigTable table = file.Table("trigger");
-//   TriggerConfig config;                                          // its members' initial values are the defaults
-//   table.Required("pulse_period_us", config.pulse_period_us, 1000, 1'000'000);
+//   TriggerConfig config;                                          // its members' initial values are the
+//   defaults table.Required("pulse_period_us", config.pulse_period_us, 1000, 1'000'000);
 //   table.Optional("settle_ms", config.settle_ms, 0.0, 5000.0);
-//   RETURN_IF_ERROR(table.Finish());                               // first wrong, missing or unknown key of the table
+//   RETURN_IF_ERROR(table.Finish());                               // first wrong, missing or unknown key of
+//   the table
 //
-// Errors name file, key and limits in one sentence. A failed read leaves the member as it was; the struct may only be used
-// once Finish() succeeded.
+// Errors name file, key and limits in one sentence. A failed read leaves the member as it was; the struct may
+// only be used once Finish() succeeded.
 #pragma once
 
 #include <cstdint>

@@ -21,8 +21,8 @@ struct ServiceContext {
 // Makes the service on its concrete drivers; what it returns lives until the service stops.
 using ServiceFactory = std::function<Result<std::shared_ptr<void>>(const ServiceContext&)>;
 
-// forgescan-NAME --station FOLDER. Runs until SIGINT or SIGTERM. Returns the exit code: 0 stopped on request, 1 otherwise,
-// with one sentence on stderr.
+// forgescan-NAME --station FOLDER. Runs until SIGINT or SIGTERM. Returns the exit code: 0 stopped on request,
+// 1 otherwise, with one sentence on stderr.
 int RunService(const std::string& name, int argc, char** argv, const ServiceFactory& factory);
 
 }  // namespace forgescan

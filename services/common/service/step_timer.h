@@ -1,4 +1,5 @@
-// Measures a processing step and publishes how long it took. By the wall clock, and so kept out of every result.
+// Measures a processing step and publishes how long it took. By the wall clock, and so kept out of every
+// result.
 #pragma once
 
 #include <string>

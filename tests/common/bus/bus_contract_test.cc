@@ -64,7 +64,8 @@ enum class Kind { kSim, kLcm };
 class BusContract : public ::testing::TestWithParam<Kind> {
  protected:
   void SetUp() override {
-    pair_ = GetParam() == Kind::kSim ? std::unique_ptr<Pair>(std::make_unique<SimPair>()) : std::make_unique<LcmPair>();
+    pair_ = GetParam() == Kind::kSim ? std::unique_ptr<Pair>(std::make_unique<SimPair>())
+                                     : std::make_unique<LcmPair>();
   }
   std::unique_ptr<Pair> pair_;
 };
@@ -151,7 +152,8 @@ TEST(LcmBus, TellsWhatTheKernelGaveIt) {
 }
 
 TEST(LcmBus, RefusesAUrlThatIsNotABus) {
-  for (const char* url : {"", "memq://", "udpm://239.255.76.67", "udpm://239.255.76.67:99999", "file://x.log"}) {
+  for (const char* url :
+       {"", "memq://", "udpm://239.255.76.67", "udpm://239.255.76.67:99999", "file://x.log"}) {
     EXPECT_FALSE(LcmBus::Open(url).ok()) << url;
   }
 }

@@ -1,4 +1,5 @@
-// The resend protocol on the real bus with Debian's default kernel buffers, where nearly every camera frame is lost at first.
+// The resend protocol on the real bus with Debian's default kernel buffers, where nearly every camera frame
+// is lost at first.
 #include <gtest/gtest.h>
 
 #include <memory>
@@ -12,12 +13,14 @@ namespace {
 
 TEST(StreamOnLcm, ResendCarriesFramesThroughDefaultBuffers) {
   constexpr int kFrames = 8;
-  constexpr char kUrl[] = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=106496";  // the kernel makes 212992 of it
+  constexpr char kUrl[] =
+      "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=106496";  // the kernel makes 212992 of it
   auto sender_bus = LcmBus::Open(kUrl), receiver_bus = LcmBus::Open(kUrl);
   ASSERT_TRUE(sender_bus.ok() && receiver_bus.ok());
   StreamHub receiver(**receiver_bus, "receiver");
   std::vector<std::int64_t> ids;
-  receiver.Subscribe<fsmsg::frame_t>(kFrameLeft, [&](const fsmsg::frame_t& frame) { ids.push_back(frame.frame_id); });
+  receiver.Subscribe<fsmsg::frame_t>(kFrameLeft,
+                                     [&](const fsmsg::frame_t& frame) { ids.push_back(frame.frame_id); });
   StreamHub sender(**sender_bus, "sender");
   std::vector<std::int64_t> sent;
   for (int i = 1; i <= kFrames; ++i) {

@@ -1,4 +1,5 @@
-// The resend protocol on a bus that loses, doubles and reorders: every message once, whole, in order, or counted as missing.
+// The resend protocol on a bus that loses, doubles and reorders: every message once, whole, in order, or
+// counted as missing.
 #include <gtest/gtest.h>
 
 #include <numeric>
@@ -80,7 +81,8 @@ INSTANTIATE_TEST_SUITE_P(
     ::testing::Values(Case{"None", {}}, Case{"Loss", {.loss = 0.2, .large_loss = 0.2}},
                       Case{"LargeAlwaysLost", {.loss = 0.05, .large_loss = 1.0}},
                       Case{"Duplicates", {.duplicate = 0.5}}, Case{"Reordered", {.jitter_us = 300'000}},
-                      Case{"Everything", {.loss = 0.2, .large_loss = 0.6, .duplicate = 0.3, .jitter_us = 100'000}}),
+                      Case{"Everything",
+                           {.loss = 0.2, .large_loss = 0.6, .duplicate = 0.3, .jitter_us = 100'000}}),
     [](const auto& param) { return param.param.name; });
 
 TEST(Stream, LossAtTheEndIsNoticed) {
