@@ -165,10 +165,11 @@ std::string FusionService::VoidReason(const PartCollector& collector,
     return fmt::format("the robot's path {:08x} is not the one the view matrices were taught on, {:08x}", crc,
                        matrices_.path_crc32);
   }
-  std::string voids;
+  std::string voids;  // the first with its reason; the table of views has the others'
   for (const auto& view : views.summary) {
     if (view.status != fsmsg::view_result_t::STATUS_OK) {
-      voids += fmt::format("{}view {} ({})", voids.empty() ? "" : ", ", view.view, view.reason);
+      voids +=
+          voids.empty() ? fmt::format("{} ({})", view.view, view.reason) : fmt::format(", {}", view.view);
     }
   }
   const auto missing = static_cast<int>(views.summary.size() - views.clouds.size());

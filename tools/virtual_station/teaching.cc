@@ -35,6 +35,31 @@ Eigen::Vector3d Triangulate(const Rig& rig, const Rectification& rectification,
   return left / left.z() * (rectification.baseline_mm / disparity);
 }
 
+// A projector is calibrated by the phases that the calibrated cameras see, so on average it agrees with them,
+// right or wrong: its centre takes up the mean difference over the working volume.
+void AgreeWithCameras(const Rig& truth, double working_distance_mm, Rig& calibrated) {
+  const Rectification rectification = Rectify(calibrated);
+  const Eigen::Isometry3d rig_from_rectified =
+      calibrated.left.camera_from_rig.inverse() *
+      Eigen::Isometry3d(rectification.rectified_from_left.transpose());
+  Eigen::Vector2d sum_px(0.0, 0.0);
+  int count = 0;
+  for (const double x : {-1.0, -0.5, 0.0, 0.5, 1.0}) {
+    for (const double y : {-1.0, -0.5, 0.0, 0.5, 1.0}) {
+      const Eigen::Vector3d p_in_rig = Eigen::Vector3d(x, y, 0.0).cwiseProduct(kMarkerSpreadMm) +
+                                       Eigen::Vector3d(0.0, 0.0, working_distance_mm);
+      const Eigen::Vector2d left = Project(truth.left.lens, truth.left.camera_from_rig * p_in_rig);
+      const Eigen::Vector2d right = Project(truth.right.lens, truth.right.camera_from_rig * p_in_rig);
+      const Eigen::Vector3d seen = rig_from_rectified * Triangulate(calibrated, rectification, left, right);
+      sum_px += Project(truth.projector.lens, truth.projector.camera_from_rig * p_in_rig) -
+                Project(calibrated.projector.lens, calibrated.projector.camera_from_rig * seen);
+      ++count;
+    }
+  }
+  calibrated.projector.lens.cx_px += sum_px.x() / count;
+  calibrated.projector.lens.cy_px += sum_px.y() / count;
+}
+
 Eigen::Isometry3d TeachView(const CellConfig& config, const Rig& calibrated,
                             const Rectification& rectification, int view) {
   RandomStream visit(config.seed, RandomUse::kTeachingVisit, {view});
@@ -77,6 +102,7 @@ Rig CalibratedRig(const CellConfig& config) {
     device->camera_from_rig =
         SmallMotion(random, error.translation_sd_mm, error.rotation_sd_rad) * device->camera_from_rig;
   }
+  AgreeWithCameras(config.rig, config.working_distance_mm, rig);
   return rig;
 }
 

@@ -60,6 +60,36 @@ TEST(Teaching, ViewMatricesAreAsGoodAsTheirMarkers) {
             0.08);  // mm: 3 sigma of 0.02 (markers), 0.016 (robot's rotation) and 0.009 (its position)
 }
 
+// Where the calibrated cameras see the point that the true ones see at `p_in_rig`.
+Eigen::Vector3d Seen(const Rig& truth, const Rig& calibrated, const Eigen::Vector3d& p_in_rig) {
+  const Rectification rectification = Rectify(calibrated);
+  const auto ray = [&](const PinholeCamera& camera, const Lens& lens, const Eigen::Matrix3d& rectify) {
+    const Eigen::Vector2d pixel = Project(camera.lens, camera.camera_from_rig * p_in_rig);
+    return Eigen::Vector2d((rectify * Unproject(lens, pixel).homogeneous()).hnormalized());
+  };
+  const Eigen::Vector2d left = ray(truth.left, calibrated.left.lens, rectification.rectified_from_left);
+  const Eigen::Vector2d right = ray(truth.right, calibrated.right.lens, rectification.rectified_from_right);
+  const double depth_mm = rectification.baseline_mm / (left.x() - right.x());
+  return calibrated.left.camera_from_rig.inverse() *
+         (rectification.rectified_from_left.transpose() * (depth_mm * left.homogeneous()));
+}
+
+TEST(Teaching, ProjectorIsCalibratedByWhatTheCamerasSee) {
+  CellConfig config = Config();
+  for (config.seed = 1; config.seed <= 20; ++config.seed) {
+    const Rig rig = CalibratedRig(config);
+    for (const double x_mm : {-100.0, 0.0, 100.0}) {
+      const Eigen::Vector3d p_in_rig(x_mm, 30.0, config.working_distance_mm);
+      const Eigen::Vector2d true_px =
+          Project(config.rig.projector.lens, config.rig.projector.camera_from_rig * p_in_rig);
+      const Eigen::Vector2d seen_px =
+          Project(rig.projector.lens, rig.projector.camera_from_rig * Seen(config.rig, rig, p_in_rig));
+      EXPECT_NEAR(seen_px.x(), true_px.x(), 0.1)
+          << config.seed;  // px: 0.15 px of focal length, 1/6 off the axis
+    }
+  }
+}
+
 TEST(Scene, WearMakesPlatesSmallerPartByPart) {
   PartConfig config = Config().part;
   config.plate_sd_mm = 0.0;
