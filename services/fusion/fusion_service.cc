@@ -168,8 +168,8 @@ std::string FusionService::VoidReason(const PartCollector& collector,
   std::string voids;  // the first with its reason; the table of views has the others'
   for (const auto& view : views.summary) {
     if (view.status != fsmsg::view_result_t::STATUS_OK) {
-      voids +=
-          voids.empty() ? fmt::format("{} ({})", view.view, view.reason) : fmt::format(", {}", view.view);
+      voids += voids.empty() ? fmt::format("view {} ({})", view.view, view.reason)
+                             : fmt::format(", view {}", view.view);
     }
   }
   const auto missing = static_cast<int>(views.summary.size() - views.clouds.size());
