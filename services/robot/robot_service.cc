@@ -132,6 +132,13 @@ void RobotService::OnVerdict(const fsmsg::verdict_t& verdict) {
                               verdict.part));
     return;
   }
+  const std::int64_t* arrived_us = arrived_us_.Find(verdict.part);
+  if (arrived_us != nullptr && verdict.utime < *arrived_us) {
+    monitor_.ReportError(Fail(ErrorCode::kInvalidArgument,
+                              "a verdict on part {} is of an earlier part with this number: not sorted by it",
+                              verdict.part));
+    return;
+  }
   DoSort(sorter_.OnVerdict(static_cast<std::uint32_t>(verdict.part),
                            static_cast<LineVerdict>(verdict.verdict), Now()));
 }
@@ -151,6 +158,7 @@ void RobotService::Do(const PartStarted& start) {
   message.path = config_.path;
   message.path_crc32 = static_cast<std::int32_t>(start.path_crc32);
   monitor_.Count("parts");
+  arrived_us_.Insert(message.part, message.utime);
   Note(hub_.Publish(kPartArrived, message));
 }
 

@@ -2,6 +2,7 @@
 // other.
 #pragma once
 
+#include "services/common/aged_map.h"
 #include "services/common/bus/channels.h"
 #include "services/common/service/service_monitor.h"
 #include "services/robot/robot_machine.h"
@@ -50,6 +51,7 @@ class RobotService {
   RobotConfig config_;
   RobotMachine machine_;
   SortMachine sorter_;
+  AgedMap<std::int32_t, std::int64_t> arrived_us_{16};  // by part; more are not in the cell
   RobotStatus status_;
   double body_degc_;
   double part_degc_;

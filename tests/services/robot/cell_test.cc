@@ -68,9 +68,10 @@ class Cell : public testing::Test {
   bool RunUntilScans(std::size_t count, std::int64_t seconds = 60) {
     return network_.RunUntilTrue([&] { return scans_.size() >= count; }, seconds * kSecond_us);
   }
-  void Verdict(int part, int verdict) {
+  void Verdict(int part, int verdict) { Verdict(part, verdict, network_.NowUs()); }
+  void Verdict(int part, int verdict, std::int64_t utime) {
     fsmsg::verdict_t message{};
-    message.utime = network_.NowUs();
+    message.utime = utime;
     message.part = part;
     message.verdict = static_cast<std::int8_t>(verdict);
     EXPECT_TRUE(world_.hub.Publish(kVerdict, message).ok());
@@ -251,6 +252,17 @@ TEST_F(Cell, AServiceThatRestartsTakesTheControllersNumbersUp) {
   network_.RunFor(2 * kSecond_us);
   ASSERT_FALSE(sequence.empty());
   EXPECT_GT(sequence.front(), seq_before);
+}
+
+TEST_F(Cell, AVerdictOnAnEarlierPartOfTheSameNumberSortsNothing) {
+  ASSERT_TRUE(RunUntilScans(1));
+  Verdict(1, fsmsg::verdict_t::VERDICT_OK, arrived_.at(0).utime - 1);
+  network_.RunFor(2 * kSecond_us);
+  EXPECT_TRUE(sorted_.empty());
+  Verdict(1, fsmsg::verdict_t::VERDICT_NOT_OK, arrived_.at(0).utime);
+  network_.RunFor(2 * kSecond_us);
+  ASSERT_EQ(sorted_.size(), 1U);
+  EXPECT_EQ(line_sim_.sorted().at(0).verdict, LineVerdict::kNotOk);
 }
 
 TEST_F(Cell, AnUnheardSortCommandIsReported) {
