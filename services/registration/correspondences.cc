@@ -100,7 +100,7 @@ std::vector<Pair> PairWithSurface(const ScanSample& sample, const RegistrationMo
       hint = hit->triangle;
       const Eigen::Vector3f& normal = model.surface().Normal(hit->triangle);
       const bool agree = NormalsAgree(sample, i, rotation, normal, min_cosine);
-      pairs[i] = {p, hit->foot, normal, hit->distance_mm, agree ? 1.0F : 0.0F};
+      pairs[i] = {p, hit->foot, normal, hit->distance_mm, agree && !hit->on_rim ? 1.0F : 0.0F};
     }
   });
   return pairs;

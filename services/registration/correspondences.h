@@ -29,7 +29,8 @@ std::vector<Pair> PairWithSamples(const ScanSample& sample, const RegistrationMo
                                   const Eigen::Isometry3d& model_from_scan, const IcpOptions& options);
 
 // Step 3 with the nearest point of the surface within `reach_mm`; weight 0 where there is none or the normals
-// disagree, with distance_mm = reach_mm in the first case.
+// disagree, with distance_mm = reach_mm in the first case. Weight 0 also on a rim: a point beyond it has no
+// partner, and would hold the pose by a face that was not seen.
 std::vector<Pair> PairWithSurface(const ScanSample& sample, const RegistrationModel& model,
                                   const Eigen::Isometry3d& model_from_scan, double reach_mm,
                                   const IcpOptions& options);

@@ -3,6 +3,8 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <tuple>
+#include <utility>
 
 namespace forgescan {
 namespace {
@@ -10,6 +12,7 @@ namespace {
 constexpr std::size_t kLeafSize = 4;
 // Two triangles that share the nearest edge give distances that differ by rounding only.
 constexpr float kTie = 1e-5F;
+constexpr float kOnEdge_mm = 1e-3F;  // ten times the rounding over a 2 m part
 
 // Nearest point to p of the triangle a + s ab + t ac (regions of the plane as in Ericson, Real-Time Collision
 // Detection, 5.1.5).
@@ -77,9 +80,10 @@ Result<TriangleIndex> TriangleIndex::Build(const std::vector<Eigen::Vector3f>& v
     const Eigen::Vector3f ab = vertices[t[1]] - vertices[t[0]], ac = vertices[t[2]] - vertices[t[0]];
     const Eigen::Vector3d normal = ab.cast<double>().cross(ac.cast<double>());
     const Eigen::Vector3d unit = normal.norm() > 0 ? normal.normalized().eval() : normal;
-    index.corners_.push_back({a, ab, ac, unit.cast<float>(), static_cast<std::uint32_t>(i)});
+    index.corners_.push_back({a, ab, ac, unit.cast<float>(), static_cast<std::uint32_t>(i), 0});
     centroids.emplace_back(a + (ab + ac) / 3.0F);
   }
+  index.MarkRims(vertices, triangles);
   index.nodes_.reserve(triangles.size());
   index.BuildNode(0, triangles.size(), centroids);
   index.slot_of_.resize(triangles.size());
@@ -87,6 +91,48 @@ Result<TriangleIndex> TriangleIndex::Build(const std::vector<Eigen::Vector3f>& v
     index.slot_of_[index.corners_[slot].triangle] = slot;
   }
   return index;
+}
+
+// Neighbours are found by the places of their corners: STL files do not share vertices.
+void TriangleIndex::MarkRims(const std::vector<Eigen::Vector3f>& vertices,
+                             const std::vector<TriangleCorners>& triangles) {
+  using Place = std::array<float, 3>;
+  struct Side {
+    Place from, to;
+    std::uint32_t slot, bit;
+  };
+  std::vector<Side> sides;
+  sides.reserve(3 * triangles.size());
+  const auto place = [&](std::uint32_t vertex) {
+    return Place{vertices[vertex].x(), vertices[vertex].y(), vertices[vertex].z()};
+  };
+  for (std::uint32_t slot = 0; slot < triangles.size(); ++slot) {
+    const TriangleCorners& t = triangles[slot];
+    for (const auto& [i, j, bit] : {std::array{0U, 1U, 1U}, {0U, 2U, 2U}, {1U, 2U, 4U}}) {
+      const auto [from, to] = std::minmax({place(t[i]), place(t[j])});
+      sides.push_back({from, to, slot, bit});
+    }
+  }
+  const auto key = [](const Side& side) { return std::tie(side.from, side.to, side.slot); };
+  std::sort(sides.begin(), sides.end(), [&](const Side& x, const Side& y) { return key(x) < key(y); });
+  const auto min_cosine = static_cast<float>(std::cos(kSharpEdge_rad));
+  for (std::size_t begin = 0, end = 0; begin < sides.size(); begin = end) {
+    while (end < sides.size() && sides[end].from == sides[begin].from && sides[end].to == sides[begin].to)
+      ++end;
+    const bool smooth = end - begin == 2 && corners_[sides[begin].slot].normal.dot(
+                                                corners_[sides[begin + 1].slot].normal) > min_cosine;
+    for (std::size_t i = begin; i < end && !smooth; ++i) corners_[sides[i].slot].rims |= sides[i].bit;
+  }
+}
+
+bool TriangleIndex::IsOnRim(const Corners& c, const Eigen::Vector3f& foot) const {
+  const auto near = [&](std::uint32_t bit, const Eigen::Vector3f& start, const Eigen::Vector3f& side) {
+    if ((c.rims & bit) == 0) return false;
+    const Eigen::Vector3f arm = foot - start;
+    const float along = std::clamp(arm.dot(side) / std::max(side.squaredNorm(), 1e-30F), 0.0F, 1.0F);
+    return (arm - along * side).norm() <= kOnEdge_mm;
+  };
+  return near(1, c.a, c.ab) || near(2, c.a, c.ac) || near(4, c.a + c.ab, c.ac - c.ab);
 }
 
 // Splits at the median centroid of the longest axis: depth stays below 2 + log2(n), so recursion is bounded.
@@ -161,7 +207,8 @@ std::optional<TriangleIndex::Nearest> TriangleIndex::Find(const Eigen::Vector3f&
     stack[depth++] = near;
   }
   if (best.slot == kNoTriangle) return std::nullopt;
-  return Nearest{corners_[best.slot].triangle, (p - best.foot).norm(), best.foot + center_};
+  const Corners& hit = corners_[best.slot];
+  return Nearest{hit.triangle, (p - best.foot).norm(), best.foot + center_, IsOnRim(hit, best.foot)};
 }
 
 }  // namespace forgescan

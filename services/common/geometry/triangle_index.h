@@ -19,12 +19,15 @@ using TriangleCorners = std::array<std::uint32_t, 3>;  // one entry of TriangleM
 // vertices. Precision: single precision about the mesh's centre, about 1e-4 mm over a 2 m part.
 class TriangleIndex {
  public:
+  // Faces that meet at a larger angle meet at a sharp edge; above what tessellation makes of curved faces.
+  static constexpr double kSharpEdge_rad = 0.6;
   static constexpr std::uint32_t kNoTriangle = std::numeric_limits<std::uint32_t>::max();
 
   struct Nearest {
     std::uint32_t triangle;  // in the order given to Build
     float distance_mm;       // >= 0
     Eigen::Vector3f foot;    // nearest point of the mesh
+    bool on_rim;             // the foot lies on a sharp edge, or where the mesh ends
   };
 
   // Errors: kInvalidArgument for no triangles, a vertex number out of range, or a vertex that is not finite.
@@ -49,6 +52,7 @@ class TriangleIndex {
   struct Corners {
     Eigen::Vector3f a, ab, ac, normal;
     std::uint32_t triangle;
+    std::uint32_t rims;  // bits: the edge a-b, a-c, b-c is sharp or has no neighbour
   };
   struct Node {
     Eigen::Vector3f low;
@@ -60,6 +64,8 @@ class TriangleIndex {
   struct Best;
 
   void BuildNode(std::size_t begin, std::size_t end, std::vector<Eigen::Vector3f>& centroids);
+  void MarkRims(const std::vector<Eigen::Vector3f>& vertices, const std::vector<TriangleCorners>& triangles);
+  bool IsOnRim(const Corners& corners, const Eigen::Vector3f& foot) const;
   void VisitLeaf(const Node& leaf, const Eigen::Vector3f& point, Best& best) const;
 
   Eigen::Vector3f center_ = Eigen::Vector3f::Zero();

@@ -159,6 +159,49 @@ TEST_F(RegistrationTest, RefusesWhatDoesNotFixThePose) {
   EXPECT_EQ(result.error().code, ErrorCode::kDegenerate) << result.error().message;
 }
 
+// A box of 60 x 40 x 20 mm, outward faces.
+TriangleMesh Box() {
+  TriangleMesh mesh;
+  for (int corner = 0; corner < 8; ++corner) {
+    mesh.vertices.emplace_back((corner & 1) != 0 ? 30.0F : -30.0F, (corner & 2) != 0 ? 20.0F : -20.0F,
+                               (corner & 4) != 0 ? 10.0F : -10.0F);
+  }
+  for (const auto& [a, b, c, d] : {std::array{0U, 2U, 3U, 1U},
+                                   {4U, 5U, 7U, 6U},
+                                   {0U, 1U, 5U, 4U},
+                                   {2U, 6U, 7U, 3U},
+                                   {0U, 4U, 6U, 2U},
+                                   {1U, 3U, 7U, 5U}}) {
+    mesh.triangles.push_back({a, b, c});
+    mesh.triangles.push_back({a, c, d});
+  }
+  return mesh;
+}
+
+// Its top and one side, 3 mm longer than the box at each end, and no end face: nothing says where it lies
+// along x. Points beyond the ends must not hold it by faces that were not seen.
+TEST_F(RegistrationTest, PointsBeyondAnEdgeDoNotFixThePose) {
+  const auto bundle = ModelFromMesh(Box(), 1);
+  ASSERT_TRUE(bundle.ok()) << bundle.error().message;
+  const auto model = RegistrationModel::Build(*bundle);
+  ASSERT_TRUE(model.ok()) << model.error().message;
+  PointCloud scan;
+  for (float x = -33; x <= 33; x += 0.25F) {
+    for (float along = -9.75F; along <= 9.75F; along += 0.5F) {
+      scan.points.emplace_back(x, 2 * along, 10.0F);
+      scan.points.emplace_back(x, 20.0F, along);
+    }
+  }
+  IcpOptions options;
+  options.start_translation_mm = 6;
+  for (const double start_mm : {-2.0, 0.0, 3.0}) {
+    const auto result =
+        RegisterScan(scan, *model, Eigen::Isometry3d(Eigen::Translation3d(start_mm, 0, 0)), options);
+    ASSERT_FALSE(result.ok()) << start_mm << " ended at " << result->model_from_scan.translation().x();
+    EXPECT_EQ(result.error().code, ErrorCode::kDegenerate) << result.error().message;
+  }
+}
+
 TEST_F(RegistrationTest, RefusesAStartThatIsFarOff) {
   const Eigen::Isometry3d scan_from_model(Eigen::Translation3d(400, 0, 0));
   const PointCloud scan = Moved(ScanOf(*bundle_, {20'000, 0, 0.03, 6}), scan_from_model);
