@@ -3,6 +3,7 @@
 #include <cstdio>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <optional>
 
 #include "services/common/features/cylinder_fit.h"
@@ -83,6 +84,7 @@ Result<Json> FitShape(const Arguments& arguments, const Points& points) {
     json["axis_point_mm"] = Vector(fit.axis_point);
     json["axis"] = Vector(fit.axis);
     json["radius_mm"] = fit.radius_mm;
+    json["axis_uncertainty_deg"] = fit.AxisUncertaintyRad() * 180 / std::numbers::pi;
     json["arc_deg"] = fit.arc_deg;
     json["radius_uncertainty_mm"] = fit.RadiusUncertaintyMm();
   }

@@ -10,6 +10,7 @@
 namespace forgescan {
 namespace {
 
+constexpr double kMaxAxisUncertainty_deg = 0.3;  // standard uncertainty
 using Matrix5 = Eigen::Matrix<double, 5, 5>;
 using Vector5 = Eigen::Matrix<double, 5, 1>;
 using Points = std::span<const Eigen::Vector3d>;
@@ -222,6 +223,17 @@ Result<CylinderFit> FromStart(Points points, const std::optional<CylinderStart>&
   return c;
 }
 
+Status CheckAxis(const CylinderFit& cylinder) {
+  const double uncertainty_deg = cylinder.AxisUncertaintyRad() * 180 / std::numbers::pi;
+  if (uncertainty_deg > kMaxAxisUncertainty_deg) {
+    return Fail(
+        ErrorCode::kDegenerate,
+        "the points do not fix the cylinder's axis: its direction is uncertain by {:.1f} deg, limit {}",
+        uncertainty_deg, kMaxAxisUncertainty_deg);
+  }
+  return {};
+}
+
 }  // namespace
 
 Result<CylinderFit> FitCylinder(std::span<const Eigen::Vector3d> points,
@@ -240,6 +252,7 @@ Result<CylinderFit> FitCylinder(std::span<const Eigen::Vector3d> points,
   cylinder.axis.cwiseAbs().maxCoeff(&largest);
   if (cylinder.axis[largest] < 0) cylinder.axis = -cylinder.axis;
   cylinder.covariance *= cylinder.quality.sigma_mm * cylinder.quality.sigma_mm;
+  RETURN_IF_ERROR(CheckAxis(cylinder));
   return cylinder;
 }
 

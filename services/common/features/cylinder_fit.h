@@ -1,6 +1,8 @@
 // Least-squares cylinder.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <optional>
 
 #include "services/common/features/robust_fit.h"
@@ -27,6 +29,8 @@ struct CylinderFit {
     return (q - q.dot(axis) * axis).norm() - radius_mm;
   }
   double RadiusUncertaintyMm() const { return std::sqrt(covariance(4, 4)); }
+  // Standard uncertainty of the axis' direction, its larger one.
+  double AxisUncertaintyRad() const { return std::sqrt(std::max(covariance(2, 2), covariance(3, 3))); }
 };
 
 struct CylinderStart {
@@ -39,8 +43,8 @@ struct CylinderStart {
 // Gauss-Newton over the five parameters. Without a start, directions all over the half sphere are tried on a
 // sample of the points, each with an algebraic circle. Errors: kInvalidArgument (fewer than
 // options.min_points, not finite, start not usable); kDegenerate if the points do not fix the axis or the
-// radius (an arc too short, or too flat for its scatter: CheckSagitta()); kUntrusted: CheckForm();
-// kNotConverged.
+// radius (an arc too short, or too flat for its scatter: CheckSagitta(); a ring so low that its scatter turns
+// the axis by more than 0.3 degrees); kUntrusted: CheckForm(); kNotConverged.
 Result<CylinderFit> FitCylinder(std::span<const Eigen::Vector3d> points,
                                 const std::optional<CylinderStart>& start, const RobustOptions& options);
 

@@ -13,6 +13,7 @@ namespace {
 
 constexpr double kOrthonormalTolerance =
     1e-6;  // a rotation printed with 8 digits passes, one with 4 does not
+constexpr double kMaxPixelAspect = 0.005;
 
 Result<std::vector<double>> ReadNumbers(const cv::FileStorage& file, const std::string& key,
                                         const std::string& name) {
@@ -127,6 +128,17 @@ Status CheckIntrinsics(const CameraIntrinsics& camera, const char* which) {
   return CheckForm(camera.camera_matrix, which);
 }
 
+// Industrial cameras have square pixels; a focal length that was mistyped has not.
+Status CheckPixels(const CameraIntrinsics& camera, const char* which) {
+  const double ratio = camera.camera_matrix(0, 0) / camera.camera_matrix(1, 1);
+  if (std::abs(ratio - 1) > kMaxPixelAspect) {
+    return Fail(ErrorCode::kInvalidArgument,
+                "the focal lengths of the {} are {:.1f} and {:.1f} px, square pixels need them equal to {} %",
+                which, camera.camera_matrix(0, 0), camera.camera_matrix(1, 1), 100 * kMaxPixelAspect);
+  }
+  return {};
+}
+
 Status CheckPose(const PoseFromLeft& pose, const char* which) {
   if (!pose.rotation.allFinite() || !pose.translation_mm.allFinite()) {
     return Fail(ErrorCode::kInvalidArgument, "the pose of the {} holds a number that is not finite", which);
@@ -149,6 +161,8 @@ Status CheckPose(const PoseFromLeft& pose, const char* which) {
 Status Check(const StereoCalibration& calibration) {
   RETURN_IF_ERROR(CheckIntrinsics(calibration.left, "left camera"));
   RETURN_IF_ERROR(CheckIntrinsics(calibration.right, "right camera"));
+  RETURN_IF_ERROR(CheckPixels(calibration.left, "left camera"));
+  RETURN_IF_ERROR(CheckPixels(calibration.right, "right camera"));
   RETURN_IF_ERROR(CheckPose(calibration.right_from_left, "right camera"));
   if (calibration.projector) {
     RETURN_IF_ERROR(CheckIntrinsics(calibration.projector->intrinsics, "projector"));

@@ -42,8 +42,9 @@ struct StereoCalibration {
 };
 
 // Frames: left and right are the raw cameras, before rectification. Errors: kInvalidArgument for numbers that
-// are not finite, a focal length <= 0, a camera matrix with skew or a last row other than 0 0 1, a rotation
-// that is not orthonormal to 1e-6 or a mirror, a baseline of 0.
+// are not finite, a focal length <= 0, focal lengths of a camera that differ by more than 0.5 %, a camera
+// matrix with skew or a last row other than 0 0 1, a rotation that is not orthonormal to 1e-6 or a mirror, a
+// baseline of 0.
 Status Check(const StereoCalibration& calibration);
 
 // Reads an OpenCV file storage (YAML, XML, JSON): Kl Dl Kr Dr R T in mm with x_right = R x_left + T;

@@ -178,6 +178,26 @@ TEST(FitTest, CylinderWithoutAStart) {
   EXPECT_NEAR(cylinder->quality.rejected_share(), 0.1, 0.01);
 }
 
+// Noise of 0.05 mm turns the axis of a ring 0.05 mm high by some degrees, of one 2 mm high by 0.1 degree.
+// in 2 mm.
+TEST(FitTest, RingTooLowForItsScatterHasNoAxis) {
+  for (const double height_mm : {0.05, 2.0}) {
+    Scatter s;
+    Points ring;
+    for (int i = 0; i < 5000; ++i) {
+      const double turn = s.Between(0, 2 * std::numbers::pi), radius_mm = 25 + s.Noise(0.05);
+      ring.emplace_back(radius_mm * std::cos(turn), radius_mm * std::sin(turn), s.Between(0, height_mm));
+    }
+    const auto cylinder = FitCylinder(ring, std::nullopt, {});
+    EXPECT_EQ(cylinder.ok(), height_mm == 2.0);
+    if (cylinder.ok()) {
+      EXPECT_LT(std::acos(cylinder->axis.z()), 4 * cylinder->AxisUncertaintyRad());
+    } else {
+      EXPECT_EQ(cylinder.error().code, ErrorCode::kDegenerate) << cylinder.error().message;
+    }
+  }
+}
+
 TEST(FitTest, CylinderArcAndUncertaintyFollowWhatIsSeen) {
   double before_mm = 0;
   for (const double arc_deg : {300.0, 180.0, 120.0, 60.0}) {

@@ -51,6 +51,7 @@ TEST(StereoCalibration, EveryWrongEntryIsNamed) {
       {"-100., 0., 0.", "0., 0., 0.", "baseline of the right camera is 0"},
       {"-100., 0., 0.", ".Nan, 0., 0.", "not finite"},
       {"600., 0., 160.", "-600., 0., 160.", "focal lengths of the left camera"},
+      {"600., 0., 160.", "604., 0., 160.", "left camera are 604.0 and 600.0 px"},
       {"600., 0., 160.", "600., 0.5, 160.", "left camera holds 0.5 in row 1, column 2"},
       {"0., 600., 120.", "0.1, 600., 120.", "left camera holds 0.1 in row 2, column 1"},
       {"120., 0., 0., 1.", "120., 0., 0., 2.", "left camera holds 2 in row 3, column 3"},
