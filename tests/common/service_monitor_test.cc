@@ -21,7 +21,7 @@ TEST(ServiceMonitor, TellsALossAtOnceAndNotAgainAndAgain) {
   std::int64_t lost_us = 0;
   receiver.Subscribe<fsmsg::verdict_t>(kVerdict, [](const auto&) {});
   receiver.OnLost(kVerdict, [&](std::int64_t, std::int64_t) { lost_us = network.NowUs(); });
-  StreamHub sender(network.AddNode(), "sender", {.history_bytes = 1});  // keeps one message
+  StreamHub sender(network.AddNode(), "sender", {.history_bytes = 1, .burst_bytes = 1});  // keeps one message
   sender.Advertise(kVerdict);
   network.RunFor(kSecondUs + kSecondUs / 10);
   states.clear();

@@ -6,7 +6,8 @@
 namespace forgescan {
 
 struct StreamOptions {
-  std::int64_t history_bytes = 100'000'000;  // per channel: two views of one camera
+  std::int64_t history_bytes = 100'000'000;  // kept per channel whatever its age: two views of one camera
+  std::int64_t burst_bytes = 500'000'000;    // kept per channel while younger than give_up_us: a dense cloud
   std::int64_t status_first_us = 20'000;     // after a message; doubled up to status_period_us
   std::int64_t status_period_us = 500'000;   // while nothing is sent
   std::int64_t request_after_us = 30'000;    // a message is asked for when missing this long

@@ -35,11 +35,18 @@ Status StreamSender::Publish(const std::string& channel, Bytes message) {
   return {};
 }
 
+// A message is not dropped while a receiver may still ask for it, but for the bound on memory.
 void StreamSender::Keep(History& history, std::shared_ptr<const Bytes> message) {
+  const std::int64_t now_us = bus_.NowUs();
   history.bytes += static_cast<std::int64_t>(message->size());
-  history.messages.push_back(std::move(message));
-  while (history.bytes > options_.history_bytes && history.messages.size() > 1) {
-    history.bytes -= static_cast<std::int64_t>(history.messages.front()->size());
+  history.messages.push_back({now_us, std::move(message)});
+  const auto over = [&] {
+    return history.bytes > options_.burst_bytes ||
+           (history.bytes > options_.history_bytes &&
+            now_us - history.messages.front().sent_us > options_.give_up_us);
+  };
+  while (history.messages.size() > 1 && over()) {
+    history.bytes -= static_cast<std::int64_t>(history.messages.front().bytes->size());
     history.messages.pop_front();
     ++history.first;
   }
@@ -79,7 +86,7 @@ const Bytes* StreamSender::Find(const std::string& channel, std::int64_t sequenc
   const std::int64_t index = sequence - found->second.first;
   const auto& messages = found->second.messages;
   return index >= 0 && index < static_cast<std::int64_t>(messages.size())
-             ? messages[static_cast<std::size_t>(index)].get()
+             ? messages[static_cast<std::size_t>(index)].bytes.get()
              : nullptr;
 }
 

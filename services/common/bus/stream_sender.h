@@ -28,10 +28,14 @@ class StreamSender {
   void OnRequest(const fsmsg::resend_request_t& request);
 
  private:
+  struct Kept {
+    std::int64_t sent_us;
+    std::shared_ptr<const Bytes> bytes;
+  };
   struct History {
     std::int64_t first = 1;  // sequence of messages.front()
     std::int64_t bytes = 0;
-    std::deque<std::shared_ptr<const Bytes>> messages;
+    std::deque<Kept> messages;
   };
   using Piece = std::tuple<std::string, std::int64_t, std::int32_t>;  // channel, sequence, piece
 

@@ -141,7 +141,7 @@ TEST(Stream, WhatTheSenderNoLongerKeepsIsGivenUpAtOnce) {
   StreamHub receiver(network.AddNode(), "receiver");
   Received received;
   received.Listen(receiver);
-  StreamHub sender(network.AddNode(), "sender", {.history_bytes = 1000});
+  StreamHub sender(network.AddNode(), "sender", {.history_bytes = 1000, .burst_bytes = 1000});
   sender.Advertise(kFrameLeft);
   network.RunFor(1'000'000);
   network.SetFaults({.loss = 1.0});
@@ -153,6 +153,24 @@ TEST(Stream, WhatTheSenderNoLongerKeepsIsGivenUpAtOnce) {
   EXPECT_TRUE(network.RunUntilTrue([&] { return received.ids.size() == 1; }, 2'000'000));
   EXPECT_EQ(received.ids, (std::vector<std::int64_t>{5}));
   EXPECT_EQ(received.lost, 4);
+}
+
+TEST(Stream, ABurstLargerThanTheHistoryIsKeptUntilNobodyAsksAnyMore) {
+  SimNetwork network;
+  StreamHub receiver(network.AddNode(), "receiver");
+  Received received;
+  received.Listen(receiver);
+  StreamHub sender(network.AddNode(), "sender", {.history_bytes = 1000, .burst_bytes = 10'000});
+  sender.Advertise(kFrameLeft);
+  network.RunFor(1'000'000);
+  network.SetFaults({.loss = 1.0});
+  for (int i = 1; i <= 5; ++i) {
+    ASSERT_TRUE(sender.Publish(kFrameLeft, Frame(i, 800)).ok());
+  }
+  network.RunFor(1000);
+  network.SetFaults({});
+  EXPECT_TRUE(network.RunUntilTrue([&] { return received.ids.size() == 5; }, 5'000'000));
+  EXPECT_EQ(received.lost, 0);
 }
 
 TEST(Stream, ALateReceiverStartsWithTheNextMessage) {

@@ -7,7 +7,8 @@ namespace {
 
 constexpr std::size_t kTwoSlices = 140'000;  // points
 // Keeps one cloud, and sends it again in 4.4 s: twice the time after which the service looks at losses.
-constexpr StreamOptions kSlowSender{.history_bytes = 4'500'000, .piece_gap_us = 50'000};
+constexpr StreamOptions kSlowSender{
+    .history_bytes = 4'500'000, .burst_bytes = 4'500'000, .piece_gap_us = 50'000};
 
 class ReportLossesTest : public ReportServiceTest {
  protected:
@@ -83,7 +84,8 @@ TEST_F(ReportLossesTest, ARegistrationAfterTheLossEndsThePartToo) {
 }
 
 TEST_F(ReportLossesTest, FurtherLossesDoNotPutTheVerdictOff) {
-  StreamHub fusion(network_.AddNode(), "fusion", {.history_bytes = 1});  // keeps one message
+  StreamHub fusion(network_.AddNode(), "fusion",
+                   {.history_bytes = 1, .burst_bytes = 1});  // keeps one message
   fusion.Advertise(kFusionResult);
   Arrive(1);
   network_.RunFor(kSecondUs);
