@@ -9,9 +9,9 @@
 #include "services/common/features/plane_fit.h"
 #include "services/common/features/sphere_fit.h"
 #include "services/common/geometry/cloud_io.h"
+#include "services/common/output_file.h"
 #include "tools/forgescan/command.h"
 #include "tools/forgescan/output_files.h"
-#include "tools/forgescan/text_output.h"
 
 namespace forgescan {
 namespace {
@@ -100,7 +100,7 @@ Status Run(const Arguments& arguments) {
     std::fputs(text.c_str(), stdout);
     return {};
   }
-  RETURN_IF_ERROR(WriteText(outputs.Staged(arguments.json), text));
+  RETURN_IF_ERROR(WriteOutputFile(outputs.Staged(arguments.json), text));
   return outputs.Commit();
 }
 

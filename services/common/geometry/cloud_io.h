@@ -28,8 +28,8 @@ Result<CloudFromFile> ReadPointCloud(const std::filesystem::path& path);
 // file without faces, an index out of range or a vertex that is not finite.
 Result<TriangleMesh> ReadTriangleMesh(const std::filesystem::path& path);
 
-// Writes binary little-endian PLY: points, and normals, sigma_mm and view where the cloud has them. Written
-// under another name and renamed at the end, so that nobody ever reads half a file. Errors: kInvalidArgument
+// Writes binary little-endian PLY: points, and normals, sigma_mm and view where the cloud has them. A file
+// is whole or not there, a pipe or device is written directly (output_file.h). Errors: kInvalidArgument
 // (arrays of different length), kIo.
 Status WritePly(const std::filesystem::path& path, const PointCloud& cloud);
 
