@@ -57,6 +57,7 @@ Status Prepare(const Arguments& arguments) {
   }
   RETURN_IF_ERROR(WriteWholeFile((run / "cell.toml").string(), cell_text));
   ASSIGN_OR_RETURN(const CellConfig config, LoadCellConfig((run / "cell.toml").string()));
+  RETURN_IF_ERROR(CheckImageSize(config, station_text));
   ASSIGN_OR_RETURN(const std::string commissioned, CommissionedStation(config, station_text));
   RETURN_IF_ERROR(WriteWholeFile((run / "station/station.toml").string(), commissioned));
   return WriteStation(config, ProjectedSet::kReduced, (run / "station").string());
