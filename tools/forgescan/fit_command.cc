@@ -10,6 +10,7 @@
 #include "services/common/features/sphere_fit.h"
 #include "services/common/geometry/cloud_io.h"
 #include "services/common/output_file.h"
+#include "tools/finite_range.h"
 #include "tools/forgescan/command.h"
 #include "tools/forgescan/output_files.h"
 
@@ -121,6 +122,7 @@ void AddFitCommand(CLI::App& app, Status& outcome) {
   command->add_option("--reject-sigmas", arguments->fit.reject_sigmas, "points farther off are dropped")
       ->capture_default_str();
   command->add_option("--min-points", arguments->fit.min_points, "fewer used points are no fit")
+      ->check(FiniteRange(1, 1e9))
       ->capture_default_str();
   command
       ->add_option("--max-form-share", arguments->fit.max_form_share,

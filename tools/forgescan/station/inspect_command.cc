@@ -12,6 +12,7 @@
 #include "services/common/bus/stream_hub.h"
 #include "services/common/model/bundle_file.h"
 #include "services/common/model/model_import.h"
+#include "tools/finite_range.h"
 #include "tools/forgescan/command.h"
 #include "tools/forgescan/station/interrupt.h"
 #include "tools/forgescan/station/network.h"
@@ -226,12 +227,12 @@ void AddInspectCommand(CLI::App& app, Status& outcome) {
   command->add_option("--cell", options.cell, "imperfections of the cell: a file of the station's folder");
   command->add_option("--out", options.out, "folder for the runs");
   command->add_option("--takt", options.takt_s, "seconds from part to part")
-      ->check(CLI::Range(20.0, 3600.0))
+      ->check(FiniteRange(20, 3600))
       ->capture_default_str();
   command->add_option("--scale-divisor", options.scale_divisor, "smaller images; the station must say so too")
       ->check(CLI::IsMember({1, 2, 4, 8}));
   command->add_option("--patience", options.part_patience_s, "seconds a part may take")
-      ->check(CLI::Range(1.0, 1e5));
+      ->check(FiniteRange(1, 1e5));
   command->callback([&outcome] { outcome = Inspect(options); });
 }
 
