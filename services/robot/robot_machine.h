@@ -98,6 +98,7 @@ class RobotMachine {
   // A part that leaves without having been taken up still gets its story: started, and aborted with the
   // reason.
   Actions PassBy(std::int64_t now_us);
+  bool HasNumber() const;  // the part in place, one that messages can carry
   Actions Order(RobotOrder order, std::int64_t now_us);
   Actions Abort(const std::string& reason, std::int64_t now_us);
   Actions GoHome(std::int64_t now_us);
@@ -112,7 +113,8 @@ class RobotMachine {
   std::optional<RobotStatus> status_;
   double body_degc_ = 0;
   LinePart line_part_;
-  std::int32_t last_part_ = 0;  // that was taken up, so that none is scanned twice
+  // The part in place, once it was taken up or told of, so that none is scanned twice; until it leaves.
+  std::optional<std::int32_t> last_part_;
   bool stop_ = false;
   std::string stop_reason_;
 

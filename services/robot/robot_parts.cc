@@ -1,9 +1,21 @@
 // The parts of the robot's machine that follow the line: which part is taken up, refused, or passes by.
 #include <fmt/format.h>
 
+#include <limits>
+
 #include "services/robot/robot_machine.h"
 
 namespace forgescan {
+namespace {
+
+constexpr std::int32_t kLastPart = std::numeric_limits<std::int32_t>::max();
+
+}  // namespace
+
+bool RobotMachine::HasNumber() const {
+  return line_part_.in_place && line_part_.part >= 1 &&
+         line_part_.part <= static_cast<std::uint32_t>(kLastPart);
+}
 
 // Why a part cannot be inspected now; empty when it can.
 std::string RobotMachine::WhyNot() const {
@@ -27,7 +39,8 @@ std::string RobotMachine::WhyNot() const {
 }
 
 RobotMachine::Actions RobotMachine::Start(std::int64_t now_us) {
-  part_ = last_part_ = static_cast<std::int32_t>(line_part_.part);
+  part_ = static_cast<std::int32_t>(line_part_.part);
+  last_part_ = part_;
   start_us_ = line_part_.utime;
   view_ = attempt_ = captured_ = 0;
   void_reason_.clear();
@@ -43,7 +56,7 @@ RobotMachine::Actions RobotMachine::Start(std::int64_t now_us) {
 
 RobotMachine::Actions RobotMachine::PassBy(std::int64_t now_us) {
   const auto leaving = static_cast<std::int32_t>(line_part_.part);
-  if (!line_part_.in_place || leaving == last_part_ || scanning()) {
+  if (!HasNumber() || leaving == last_part_ || scanning()) {
     return {};
   }
   last_part_ = leaving;
@@ -66,15 +79,24 @@ RobotMachine::Actions RobotMachine::OnLineLink(bool up, std::int64_t now_us) {
 RobotMachine::Actions RobotMachine::OnPart(const LinePart& part, std::int64_t now_us) {
   Actions passed;
   const bool changed = part.part != line_part_.part || part.in_place != line_part_.in_place;
-  if (changed) {
+  if (changed) {  // the time of arrival stays that of the first report
     Append(passed, PassBy(now_us));
+    line_part_ = part;
+    if (!part.in_place) {
+      last_part_.reset();  // the next one may have the same number
+    } else if (!HasNumber()) {
+      passed.emplace_back(RobotNote{fmt::format(
+          "the line calls a part {}: not inspected, parts are numbered 1 to {}", part.part, kLastPart)});
+    }
   }
-  line_part_ = changed ? part : line_part_;  // the time of arrival stays that of the first report
   if (scanning()) {
     const bool ours = part.in_place && static_cast<std::int32_t>(part.part) == part_;
-    return ours ? Actions{} : Abort(fmt::format("part {} left its place during the scan", part_), now_us);
+    if (!ours) {
+      Append(passed, Abort(fmt::format("part {} left its place during the scan", part_), now_us));
+    }
+    return passed;
   }
-  const bool new_part = line_part_.in_place && static_cast<std::int32_t>(line_part_.part) != last_part_;
+  const bool new_part = HasNumber() && static_cast<std::int32_t>(line_part_.part) != last_part_;
   const bool possible = phase_ == RobotPhase::kReady && status_.has_value();
   if (new_part && possible) {
     Append(passed, Start(now_us));

@@ -10,9 +10,10 @@
 #include "services/common/features/plane_fit.h"
 #include "services/common/features/sphere_fit.h"
 #include "services/common/geometry/cloud_io.h"
+#include "services/common/output_file.h"
+#include "tools/finite_range.h"
 #include "tools/forgescan/command.h"
 #include "tools/forgescan/output_files.h"
-#include "tools/forgescan/text_output.h"
 
 namespace forgescan {
 namespace {
@@ -102,7 +103,7 @@ Status Run(const Arguments& arguments) {
     std::fputs(text.c_str(), stdout);
     return {};
   }
-  RETURN_IF_ERROR(WriteText(outputs.Staged(arguments.json), text));
+  RETURN_IF_ERROR(WriteOutputFile(outputs.Staged(arguments.json), text));
   return outputs.Commit();
 }
 
@@ -123,6 +124,7 @@ void AddFitCommand(CLI::App& app, Status& outcome) {
   command->add_option("--reject-sigmas", arguments->fit.reject_sigmas, "points farther off are dropped")
       ->capture_default_str();
   command->add_option("--min-points", arguments->fit.min_points, "fewer used points are no fit")
+      ->check(FiniteRange(1, 1e9))
       ->capture_default_str();
   command
       ->add_option("--max-form-share", arguments->fit.max_form_share,

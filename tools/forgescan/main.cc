@@ -3,7 +3,9 @@
 
 #include "tools/forgescan/command.h"
 
-int main(int argc, char** argv) {
+namespace {
+
+int Run(int argc, char** argv) {
   CLI::App app{"forgescan: in-line 3D inspection of hot forgings"};
   app.require_subcommand(1);
   forgescan::Status outcome;
@@ -14,6 +16,11 @@ int main(int argc, char** argv) {
     forgescan::AddModelCommand(app, outcome);
     forgescan::AddStationCommand(app, outcome);
     forgescan::AddInspectCommand(app, outcome);
+    const auto is_named = [argv](const CLI::App* command) { return command->check_name(argv[1]); };
+    if (argc > 1 && argv[1][0] != '-' && app.get_subcommands(is_named).empty()) {
+      std::fprintf(stderr, "forgescan: %s is no command, --help lists them\n", argv[1]);
+      return 1;
+    }
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error);
@@ -26,4 +33,15 @@ int main(int argc, char** argv) {
     return 1;
   }
   return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const int code = Run(argc, argv);
+  if (code == 0 && (std::fflush(stdout) != 0 || std::ferror(stdout) != 0)) {  // a result nobody has
+    std::fprintf(stderr, "forgescan: standard output cannot be written\n");
+    return 1;
+  }
+  return code;
 }

@@ -4,6 +4,7 @@
 
 #include "services/common/model/bundle_file.h"
 #include "services/common/model/model_import.h"
+#include "tools/finite_range.h"
 #include "tools/forgescan/command.h"
 #include "tools/forgescan/output_files.h"
 
@@ -49,6 +50,7 @@ void AddModelCommand(CLI::App& app, Status& outcome) {
   import
       ->add_option("--chord-error-mm", arguments->import.tessellation.chord_error_mm,
                    "of the triangles of a STEP file")
+      ->check(FiniteRange(1e-6, 1e3))
       ->capture_default_str();
   import->callback([arguments, &outcome] { outcome = Import(*arguments);
 });

@@ -6,6 +6,8 @@
 #include <cassert>
 #include <system_error>
 
+#include "services/common/output_file.h"
+
 namespace forgescan {
 namespace {
 
@@ -29,11 +31,6 @@ bool AreSameFile(const fs::path& a, const fs::path& b) {
 
 bool LiesIn(const fs::path& file, const fs::path& folder) {
   return std::mismatch(folder.begin(), folder.end(), file.begin(), file.end()).first == folder.end();
-}
-
-bool IsDevice(const fs::path& path) {
-  std::error_code error;
-  return fs::exists(path, error) && !fs::is_regular_file(path, error) && !fs::is_directory(path, error);
 }
 
 Status CheckAgainstInput(const fs::path& named, const fs::path& target, const fs::path& input) {
@@ -83,12 +80,13 @@ Result<OutputFiles> OutputFiles::Create(const std::vector<fs::path>& inputs,
 }
 
 Status OutputFiles::Add(const fs::path& output) {
-  ASSIGN_OR_RETURN(const fs::path target, Followed(output));
+  const bool direct = IsDevice(output);  // a pipe behind /dev/stdout has no path that could be followed
+  ASSIGN_OR_RETURN(const fs::path target, direct ? Result<fs::path>(output) : Followed(output));
   std::error_code error;
   if (fs::is_directory(target, error) || !target.has_filename()) {
     return Fail(ErrorCode::kInvalidArgument, "{}: is a folder, not a file to write", output.string());
   }
-  if (!fs::is_directory(target.parent_path(), error)) {
+  if (!direct && !fs::is_directory(target.parent_path(), error)) {
     return Fail(ErrorCode::kNotFound, "{}: its folder does not exist", output.string());
   }
   for (const Output& other : outputs_) {
@@ -98,7 +96,7 @@ Status OutputFiles::Add(const fs::path& output) {
     }
   }
   fs::path staged = target;
-  if (!IsDevice(target)) {
+  if (!direct) {
     staged.replace_filename(fmt::format(".{}.{}", getpid(), target.filename().string()));
   }
   outputs_.push_back({output, target, staged});

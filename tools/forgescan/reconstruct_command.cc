@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
@@ -14,6 +13,7 @@
 #include <vector>
 
 #include "services/common/geometry/cloud_io.h"
+#include "services/common/output_file.h"
 #include "services/reconstruction/reconstruct.h"
 #include "tools/forgescan/command.h"
 #include "tools/forgescan/output_files.h"
@@ -129,16 +129,6 @@ nlohmann::json ToJson(const Reconstruction& reconstruction) {
   return json;
 }
 
-Status WriteJson(const std::filesystem::path& path, const nlohmann::json& json) {
-  std::ofstream file(path, std::ios::trunc);
-  file << json.dump(2) << '\n';
-  file.close();
-  if (!file) {
-    return Fail(ErrorCode::kIo, "{}: cannot be written", path.string());
-  }
-  return {};
-}
-
 Status RunReconstruct(const ReconstructArguments& arguments) {
   ASSIGN_OR_RETURN(auto outputs, OutputFiles::Create({arguments.left, arguments.right, arguments.calibration,
                                                       arguments.pattern},
@@ -149,7 +139,7 @@ Status RunReconstruct(const ReconstructArguments& arguments) {
   ASSIGN_OR_RETURN(const auto right, ReadFrames(arguments.right, pattern));
   ASSIGN_OR_RETURN(const auto result, Reconstruct(left, right, pattern, calibration, arguments.config));
   if (!arguments.json.empty()) {
-    RETURN_IF_ERROR(WriteJson(outputs.Staged(arguments.json), ToJson(result)));
+    RETURN_IF_ERROR(WriteOutputFile(outputs.Staged(arguments.json), ToJson(result).dump(2) + "\n"));
   }
   RETURN_IF_ERROR(WritePly(outputs.Staged(arguments.out), result.cloud_in_camera));
   return outputs.Commit();

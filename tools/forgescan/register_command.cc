@@ -4,6 +4,7 @@
 
 #include "services/common/geometry/cloud_io.h"
 #include "services/common/model/model_import.h"
+#include "services/common/output_file.h"
 #include "services/registration/classify.h"
 #include "services/registration/icp.h"
 #include "tools/forgescan/command.h"
@@ -67,9 +68,9 @@ Status Run(const Arguments& arguments) {
   ASSIGN_OR_RETURN(const Registration result, RegisterScan(scan, model, start, arguments.icp));
   const auto part = FindPartPoints(scan, model, result.model_from_scan, arguments.classify);
   if (!arguments.json.empty()) {
-    RETURN_IF_ERROR(WriteText(outputs.Staged(arguments.json), Json(result, scan, part.size())));
+    RETURN_IF_ERROR(WriteOutputFile(outputs.Staged(arguments.json), Json(result, scan, part.size())));
   }
-  RETURN_IF_ERROR(WriteText(outputs.Staged(arguments.out), PoseText(result.model_from_scan)));
+  RETURN_IF_ERROR(WriteOutputFile(outputs.Staged(arguments.out), PoseText(result.model_from_scan)));
   return outputs.Commit();
 }
 

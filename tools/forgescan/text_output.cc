@@ -50,18 +50,4 @@ Result<Eigen::Isometry3d> ReadPose(const std::filesystem::path& path) {
   return pose;
 }
 
-Status WriteText(const std::filesystem::path& path, const std::string& text) {
-  std::filesystem::path part = path;
-  part += ".part";
-  std::ofstream file(part, std::ios::trunc);
-  file << text;
-  file.close();
-  std::error_code error;
-  if (file.good()) std::filesystem::rename(part, path, error);
-  if (file.good() && !error) return {};
-  std::error_code ignored;
-  std::filesystem::remove(part, ignored);
-  return Fail(ErrorCode::kIo, "{}: cannot be written", path.string());
-}
-
 }  // namespace forgescan

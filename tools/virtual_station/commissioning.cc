@@ -42,6 +42,31 @@ std::optional<std::size_t> BehindHeader(const std::string& text, const std::stri
   return std::nullopt;
 }
 
+Error Broken(const toml::parse_error& error) {
+  return Fail(ErrorCode::kFormat, "station.toml: line {}: {}", error.source().begin.line,
+              error.description());
+}
+
+// The two lists of one curve: the station states both, or both are measured.
+Status CheckExpansion(const std::string& text) {
+  const toml::table root = toml::parse(text);
+  const toml::node_view fusion = root["fusion"];
+  if (!fusion["expansion_degc"] == !fusion["expansion"]) {
+    return {};
+  }
+  return Fail(ErrorCode::kFormat,
+              "station.toml: [fusion] states only one of expansion_degc and expansion; both or neither");
+}
+
+Status CheckSize(const toml::node_view<const toml::node>& stated, const char* key, std::int64_t rendered) {
+  const auto value = stated.value<std::int64_t>();
+  if (!value.has_value() || *value == rendered) {
+    return {};
+  }
+  return Fail(ErrorCode::kInvalidArgument, "station.toml: {} is {}, the cell's images make it {}", key,
+              *value, rendered);
+}
+
 Result<std::string> WithKeys(std::string text, const std::string& name, const Keys& keys) {
   const toml::table root = toml::parse(text);
   const toml::table* table = root.get_as<toml::table>(name);
@@ -106,6 +131,7 @@ Result<std::string> CommissionedStation(const CellConfig& config, const std::str
   const MeasuredNoise noise = MeasureNoise(config);
   ASSIGN_OR_RETURN(const MeasuredExpansion expansion, MeasureExpansion(config));
   try {
+    RETURN_IF_ERROR(CheckExpansion(station_text));
     ASSIGN_OR_RETURN(std::string text, WithKeys(station_text, "reconstruction",
                                                 {{"read_noise_dn", fmt::format("{:.4f}", noise.read_dn)},
                                                  {"gain_dn", fmt::format("{:.6f}", noise.gain_dn)}}));
@@ -113,8 +139,19 @@ Result<std::string> CommissionedStation(const CellConfig& config, const std::str
                     {{"expansion_degc", fmt::format("[{:.1f}]", fmt::join(expansion.degc, ", "))},
                      {"expansion", fmt::format("[{:.6f}]", fmt::join(expansion.elongation, ", "))}});
   } catch (const toml::parse_error& error) {
-    return Fail(ErrorCode::kFormat, "station.toml: line {}: {}", error.source().begin.line,
-                error.description());
+    return Broken(error);
+  }
+}
+
+Status CheckImageSize(const CellConfig& config, const std::string& station_text) {
+  const std::int64_t width = config.rig.left.width_px, height = config.rig.left.height_px;
+  try {
+    const toml::table root = toml::parse(station_text);
+    RETURN_IF_ERROR(CheckSize(root["camera"]["width_px"], "[camera] width_px", width));
+    RETURN_IF_ERROR(CheckSize(root["camera"]["height_px"], "[camera] height_px", height));
+    return CheckSize(root["trigger"]["frame_bytes"], "[trigger] frame_bytes", width * height);
+  } catch (const toml::parse_error& error) {
+    return Broken(error);
   }
 }
 

@@ -31,7 +31,12 @@ struct MeasuredExpansion {
 Result<MeasuredExpansion> MeasureExpansion(const CellConfig& config);
 
 // The text of a station.toml with the measured keys put into its tables [reconstruction] and [fusion]; a key
-// that the text gives stays as it is. Errors: kFormat, for text that is not TOML or has not these tables.
+// that the text gives stays as it is. Errors: kFormat, for text that is not TOML, has not these tables or
+// states half of the expansion curve.
 Result<std::string> CommissionedStation(const CellConfig& config, const std::string& station_text);
+
+// What a station.toml states of its images ([camera] width_px, height_px, [trigger] frame_bytes) against
+// those of the cell. Errors: kInvalidArgument, kFormat for text that is not TOML.
+Status CheckImageSize(const CellConfig& config, const std::string& station_text);
 
 }  // namespace forgescan

@@ -1,6 +1,7 @@
 #include "services/common/bus/stream_receiver.h"
 
 #include <algorithm>
+#include <limits>
 
 #include "fsmsg/resend_request_t.hpp"
 #include "services/common/bus/codec.h"
@@ -139,13 +140,17 @@ void StreamReceiver::OnPiece(const fsmsg::resend_piece_t& piece) {
 }
 
 void StreamReceiver::OnStatus(std::int64_t session, std::int64_t first, std::int64_t last) {
+  const bool sane =
+      first >= 1 && last >= 0 && last < std::numeric_limits<std::int64_t>::max() && first <= last + 1;
+  if (!sane) {
+    ++counters_.damaged;
+    return;
+  }
   if (!EnterSession(session, last + 1)) {
     return;
   }
+  GiveUp(first);  // the sender no longer has what is older
   NoteUpTo(last);
-  if (first > next_) {
-    GiveUp(first);  // the sender no longer has them
-  }
   DeliverReady();
 }
 
@@ -159,21 +164,21 @@ void StreamReceiver::DeliverReady() {
   }
 }
 
+// Each hole in one step, however long.
 void StreamReceiver::GiveUp(std::int64_t before) {
-  while (next_ < before) {
-    DeliverReady();
-    const std::int64_t first = next_;
-    while (next_ < before && !(waiting_.contains(next_) && waiting_[next_].complete)) {
-      waiting_.erase(next_++);
-    }
-    if (next_ > first) {
-      counters_.missing += next_ - first;
-      if (lost_handler_) {
-        lost_handler_(first, next_ - 1);
-      }
-    }
-  }
   DeliverReady();
+  while (next_ < before) {
+    const auto complete = std::find_if(waiting_.begin(), waiting_.end(),
+                                       [](const auto& waiting) { return waiting.second.complete; });
+    const std::int64_t first = next_;
+    next_ = complete == waiting_.end() ? before : std::min(before, complete->first);
+    waiting_.erase(waiting_.begin(), waiting_.lower_bound(next_));
+    counters_.missing += next_ - first;
+    if (lost_handler_) {
+      lost_handler_(first, next_ - 1);
+    }
+    DeliverReady();
+  }
 }
 
 bool StreamReceiver::IsOverdue(const Waiting& waiting) const {
@@ -190,7 +195,7 @@ void StreamReceiver::OnTimer() {
     if (waiting.complete) {
       continue;
     }
-    if (IsOverdue(waiting)) {
+    if (open == 0 && IsOverdue(waiting)) {  // behind one that still comes in pieces it has to wait
       give_up_before = sequence + 1;
     } else if (++open > options_.requests_at_once) {
       break;

@@ -37,6 +37,9 @@ inline int FindColumn(std::string_view property) {
   return -1;
 }
 
+// Up to here neighbouring single-precision numbers are less than 0.01 mm apart: 2^-7 mm.
+inline constexpr double kMaxCoordinateMm = 1e5;
+
 // Collects vertices row by row into a cloud; knows from the header which columns come.
 class CloudBuilder {
  public:
@@ -87,6 +90,15 @@ class CloudBuilder {
       if (std::isfinite(value) && std::abs(value) > std::numeric_limits<float>::max()) {
         return Fail(ErrorCode::kFormat, "{}: {} in point {} is too large for single precision", name, value,
                     rows_);
+      }
+    }
+    for (const CloudColumn column : {kX, kY, kZ}) {
+      if (std::isfinite(row_[column]) && std::abs(row_[column]) > kMaxCoordinateMm) {
+        return Fail(
+            ErrorCode::kFormat,
+            "{}: the coordinate {} of point {} is beyond {} mm, where single precision does not resolve "
+            "0.01 mm",
+            name, row_[column], rows_, kMaxCoordinateMm);
       }
     }
     return {};

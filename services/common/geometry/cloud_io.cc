@@ -8,6 +8,8 @@
 #include <system_error>
 #include <utility>
 
+#include "services/common/output_file.h"
+
 namespace forgescan {
 namespace {
 
@@ -73,25 +75,7 @@ Status WritePly(const std::filesystem::path& path, const PointCloud& cloud) {
                 "{}: the cloud has {} points but {} normals, {} sigmas and {} views", path.string(),
                 cloud.size(), cloud.normals.size(), cloud.sigma_mm.size(), cloud.view.size());
   }
-  const std::filesystem::path part = path.string() + ".part";
-  std::error_code failure;
-  {
-    const std::string bytes = EncodePly(cloud);
-    std::ofstream file(part, std::ios::binary | std::ios::trunc);
-    file.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-    file.close();
-    if (!file) {
-      std::filesystem::remove(part, failure);
-      return Fail(ErrorCode::kIo, "{}: cannot be written", path.string());
-    }
-  }
-  std::filesystem::rename(part, path, failure);
-  if (failure) {
-    const std::string reason = failure.message();
-    std::filesystem::remove(part, failure);
-    return Fail(ErrorCode::kIo, "{}: cannot be put in place ({})", path.string(), reason);
-  }
-  return {};
+  return WriteOutputFile(path, EncodePly(cloud));
 }
 
 }  // namespace forgescan

@@ -17,7 +17,8 @@ struct CloudFromFile : PointCloud {
 };
 
 // Reads a PLY file (ascii, binary of either byte order) or a PCD file (ascii, binary); the content decides,
-// not the name. Taken: x y z, the normal (nx ny nz or normal_x normal_y normal_z), sigma_mm, view; other
+// not the name. Coordinates of more than 100 m are refused: single precision does not resolve 0.01 mm there.
+// Taken: x y z, the normal (nx ny nz or normal_x normal_y normal_z), sigma_mm, view; other
 // properties are skipped. A point with a coordinate that is not finite is left out and counted: both formats
 // write "no point" so. Units: as in the file, mm by house rule. Errors: kNotFound, kIo, kFormat; each names
 // the file. A file is taken whole or not at all: in ascii one line is one row with the header's columns, and
@@ -28,8 +29,8 @@ Result<CloudFromFile> ReadPointCloud(const std::filesystem::path& path);
 // file without faces, an index out of range or a vertex that is not finite.
 Result<TriangleMesh> ReadTriangleMesh(const std::filesystem::path& path);
 
-// Writes binary little-endian PLY: points, and normals, sigma_mm and view where the cloud has them. Written
-// under another name and renamed at the end, so that nobody ever reads half a file. Errors: kInvalidArgument
+// Writes binary little-endian PLY: points, and normals, sigma_mm and view where the cloud has them. A file
+// is whole or not there, a pipe or device is written directly (output_file.h). Errors: kInvalidArgument
 // (arrays of different length), kIo.
 Status WritePly(const std::filesystem::path& path, const PointCloud& cloud);
 

@@ -7,6 +7,8 @@
 #include <system_error>
 #include <type_traits>
 
+#include "services/common/output_file.h"
+
 namespace forgescan {
 namespace {
 
@@ -175,19 +177,7 @@ Result<ModelBundle> DecodeBundle(const std::string& bytes) {
 }
 
 Status WriteBundle(const ModelBundle& bundle, const std::filesystem::path& path) {
-  const std::string bytes = EncodeBundle(bundle);
-  std::filesystem::path part = path;
-  part += ".part";
-  std::ofstream file(part, std::ios::binary | std::ios::trunc);
-  file.write(bytes.data(), static_cast<std::streamsize>(bytes.size())).flush();
-  const bool written = file.good();
-  file.close();
-  std::error_code renamed;
-  if (written) std::filesystem::rename(part, path, renamed);
-  if (written && !renamed) return {};
-  std::error_code ignored;
-  std::filesystem::remove(part, ignored);
-  return Fail(ErrorCode::kIo, "{}: cannot write {} bytes there", path.string(), bytes.size());
+  return WriteOutputFile(path, EncodeBundle(bundle));
 }
 
 Result<std::string> ReadWholeFile(const std::filesystem::path& path) {

@@ -18,7 +18,7 @@ std::string EncodeBundle(const ModelBundle& bundle);
 // Check(ModelBundle).
 Result<ModelBundle> DecodeBundle(const std::string& bytes);
 
-// Writes beside the target and renames, so that no half file is ever seen under its name. Errors: kIo.
+// A file is whole or not there, a pipe or device is written directly (output_file.h). Errors: kIo.
 Status WriteBundle(const ModelBundle& bundle, const std::filesystem::path& path);
 Result<ModelBundle> ReadBundle(const std::filesystem::path& path);
 

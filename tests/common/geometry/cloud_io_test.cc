@@ -152,6 +152,7 @@ constexpr char kXyz[] = "property float x\nproperty float y\nproperty float z\n"
 TEST(ParsePly, TakesAFileWholeOrNotAtAll) {
   ASSERT_TRUE(ParsePointCloud(AsciiCloud(kXyz, "1 2 3\n4 5 6\n"), "cloud").ok());
   ASSERT_TRUE(ParsePointCloud(AsciiCloud(kXyz, "1 2 3\r\n4 5 6\r\n\n"), "cloud").ok());
+  EXPECT_TRUE(ParsePointCloud(AsciiCloud(kXyz, "1 2 3\n4 -100000 6\n"), "cloud").ok());
   const std::string twice = std::string(kXyz) + "property float x\n";
   const std::string alias = std::string(kXyz) + "property float nx\nproperty float normal_x\n";
   const std::string view = std::string(kXyz) + "property ushort view\n";
@@ -163,6 +164,7 @@ TEST(ParsePly, TakesAFileWholeOrNotAtAll) {
       {AsciiCloud(kXyz, "1 2 3\n4 5 6\n7 8 9\n"), "6 bytes follow"},
       {AsciiCloud(kXyz, "1 2 3\n4 5 1e300\n"), "too large"},
       {AsciiCloud(kXyz, "1 2 3\n4 5 1e400\n"), "vertex 2 of 2"},
+      {AsciiCloud(kXyz, "1 2 3\n4 -100000.1 6\n"), "-100000.1 of point 2 is beyond 100000 mm"},
       {AsciiCloud(twice, "1 2 3 1\n4 5 6 4\n"), "property x twice"},
       {AsciiCloud(alias, "1 2 3 0 0\n4 5 6 0 0\n"), "normal_x twice"},
       {AsciiCloud(view, "1 2 3 0\n4 5 6 1.5\n"), "1.5 of point 2"},

@@ -48,8 +48,32 @@ TEST(PassingPart, IsToldOnce) {
   machine.OnPart(InPlace(7, 1000), 1000);
   EXPECT_EQ(machine.OnPart(Left(7, 2000), 2000).size(), 2u);
   EXPECT_TRUE(machine.OnPart(Left(7, 2100), 2100).empty());
-  EXPECT_TRUE(machine.OnPart(InPlace(7, 2200), 2200).empty());
-  EXPECT_TRUE(machine.OnPart(Left(7, 2300), 2300).empty());
+}
+
+TEST(PassingPart, TheNextPartMayHaveTheSameNumber) {
+  RobotMachine machine{RobotConfig{}};
+  machine.OnPart(InPlace(7, 1000), 1000);
+  machine.OnPart(Left(7, 2000), 2000);
+  EXPECT_TRUE(machine.OnPart(InPlace(7, 3000), 3000).empty());
+  const auto actions = machine.OnPart(Left(7, 4000), 4000);
+  ASSERT_EQ(actions.size(), 2u);
+  EXPECT_EQ(std::get<PartStarted>(actions[0]).utime, 3000);
+  EXPECT_EQ(std::get<ScanFinished>(actions[1]).part, 7);
+}
+
+TEST(PassingPart, ANumberThatMessagesCannotCarryIsNamed) {
+  for (const std::uint32_t part : {0u, 1u << 31}) {
+    RobotMachine machine{RobotConfig{}};
+    for (int time = 1000; time < 5000; time += 2000) {  // twice: the line may not count at all
+      const auto actions = machine.OnPart(InPlace(part, time), time);
+      ASSERT_EQ(actions.size(), 1u) << part;
+      EXPECT_THAT(std::get<RobotNote>(actions[0]).text, HasSubstr(std::to_string(part) + ": not inspected"));
+      EXPECT_TRUE(machine.OnPart(InPlace(part, time + 500), time + 500).empty());
+      EXPECT_TRUE(machine.OnPart(Left(part, time + 1000), time + 1000).empty());
+    }
+    EXPECT_TRUE(machine.OnPart(InPlace(7, 6000), 6000).empty());
+    EXPECT_EQ(machine.OnPart(Left(7, 7000), 7000).size(), 2u);  // works again
+  }
 }
 
 }  // namespace

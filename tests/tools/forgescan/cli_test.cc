@@ -1,6 +1,8 @@
 // The offline commands as a user or a script calls them: exit code, one sentence, files only for trustworthy
 // results.
 #include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <sys/sysmacros.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -33,10 +35,11 @@ class Cli : public ::testing::Test {
   }
   void TearDown() override { fs::remove_all(folder_); }
 
+  // What `arguments` redirect themselves is not in the output.
   Output Call(const std::string& arguments) const {
     Output output;
     const std::string command =
-        "cd " + folder_.string() + " && " + FORGESCAN_BIN_DIR + "/forgescan " + arguments + " 2>&1";
+        "cd " + folder_.string() + " && " + FORGESCAN_BIN_DIR + "/forgescan 2>&1 " + arguments;
     FILE* pipe = popen(command.c_str(), "r");
     std::array<char, 4096> buffer{};
     while (std::fgets(buffer.data(), buffer.size(), pipe) != nullptr) {
@@ -272,7 +275,34 @@ TEST_F(Cli, ReconstructNamesWhatIsMissing) {
 TEST_F(Cli, AnUnknownCommandIsAUsageError) {
   const Output output = Call("melt");
   EXPECT_NE(output.exit_code, 0);
-  EXPECT_NE(output.text.find("subcommand is required"), std::string::npos) << output.text;
+  EXPECT_NE(output.text.find("melt is no command"), std::string::npos) << output.text;
+  EXPECT_NE(Call("").text.find("subcommand is required"), std::string::npos);
+}
+
+TEST_F(Cli, NumbersOutsideTheirRangeAreUsageErrors) {
+  WriteCloud("c.ply", HalfCylinder());
+  for (const char* call :
+       {"inspect --takt nan", "inspect --takt inf", "inspect --patience nan",
+        "model import block.stl --chord-error-mm inf", "fit cylinder --cloud c.ply --min-points -1"}) {
+    const Output output = Call(call);
+    EXPECT_NE(output.exit_code, 0) << call;
+    EXPECT_NE(output.text.find("is not a number from"), std::string::npos) << output.text;
+  }
+}
+
+TEST_F(Cli, AResultThatStandardOutputCannotTakeIsAnError) {
+  const fs::path full = folder_ / "full";
+  if (mknod(full.c_str(), S_IFCHR | 0600, makedev(1, 7)) != 0 || !std::ofstream(full)) {
+    GTEST_SKIP() << "needs the right to make a device node";
+  }
+  WriteCloud("c.ply", HalfCylinder());
+  for (const char* call : {"fit cylinder --cloud c.ply", "--help"}) {
+    EXPECT_EQ(Call(std::string(call) + " 2>error.txt >full").exit_code, 1) << call;
+    std::ifstream error(folder_ / "error.txt");
+    std::string sentence;
+    std::getline(error, sentence);
+    EXPECT_EQ(sentence, "forgescan: standard output cannot be written") << call;
+  }
 }
 
 }  // namespace

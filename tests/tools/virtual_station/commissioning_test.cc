@@ -112,6 +112,32 @@ TEST(Commissioning, WhatTheStationSaysItselfStays) {
   EXPECT_TRUE(root["reconstruction"]["read_noise_dn"].is_floating_point());
 }
 
+TEST(Commissioning, HalfAnExpansionCurveIsRefused) {
+  for (const char* key : {"expansion", "expansion_degc"}) {
+    const auto half =
+        CommissionedStation(Config(), fmt::format("[fusion]\n{} = [900.0, 1000.0]\n[reconstruction]\n", key));
+    ASSERT_FALSE(half.ok()) << key;
+    EXPECT_THAT(half.error().message, HasSubstr("only one of expansion_degc and expansion"));
+  }
+}
+
+TEST(Commissioning, TheStationsImagesAreThoseOfTheCell) {
+  const CellConfig config = *LoadCellConfig(kStations + "virtual/cell.toml", 4);
+  EXPECT_TRUE(CheckImageSize(config, StationText("virtual-small")).ok());
+  EXPECT_TRUE(
+      CheckImageSize(*LoadCellConfig(kStations + "virtual/cell.toml", 1), StationText("virtual")).ok());
+  const std::pair<std::string, const char*> wrong[] = {
+      {StationText("virtual"), "width_px is 2448, the cell's images make it 612"},
+      {"[camera]\nwidth_px = 612\nheight_px = 2048\n", "height_px is 2048, the cell's images make it 512"},
+      {"[trigger]\nframe_bytes = 5013504\n", "frame_bytes is 5013504, the cell's images make it 313344"},
+      {"[camera", "line 1"}};
+  for (const auto& [text, what] : wrong) {
+    const Status status = CheckImageSize(config, text);
+    ASSERT_FALSE(status.ok()) << what;
+    EXPECT_THAT(status.error().message, HasSubstr(what));
+  }
+}
+
 TEST(Commissioning, RefusesATextWithoutItsTables) {
   const auto missing = CommissionedStation(Config(), "[reconstruction]\n");
   ASSERT_FALSE(missing.ok());

@@ -139,5 +139,11 @@ TEST_F(LiveCellTest, AViewTakenAgainIsSeenAnew) {
   EXPECT_GT(view["time_s"].get<double>(), first_view_s_ + 2 * move_s);
 }
 
+TEST_F(LiveCellTest, APartThatIsSortedBeforeItIsPreparedHasItsTruth) {
+  cell_->StartLine();
+  ASSERT_TRUE(RunUntil([&] { return part_.in_place; }));
+  EXPECT_EQ(SortAndReadTruth()["part"], 1);
+}
+
 }  // namespace
 }  // namespace forgescan

@@ -8,13 +8,14 @@
 #include <ctime>
 #include <filesystem>
 
-#include "services/common/bus/channels.h"
 #include "services/common/bus/stream_hub.h"
 #include "services/common/model/bundle_file.h"
 #include "services/common/model/model_import.h"
+#include "tools/finite_range.h"
 #include "tools/forgescan/command.h"
 #include "tools/forgescan/station/interrupt.h"
 #include "tools/forgescan/station/network.h"
+#include "tools/forgescan/station/run_outcome.h"
 #include "tools/forgescan/station/station_runner.h"
 
 namespace forgescan {
@@ -105,38 +106,6 @@ Result<fs::path> MakeRunFolder(const std::string& base) {
   return Fail(ErrorCode::kIo, "no new folder can be made in {}", base);
 }
 
-// The truth goes beside the report only now, when every service is done with the part.
-Status PublishTruth(const fs::path& run, const Station& station, const fsmsg::verdict_t& verdict) {
-  const fs::path truth = run / "truth" / fmt::format("part_{:06}.json", verdict.part);
-  const fs::path folder = fs::path(station.results) / verdict.report_folder;
-  std::error_code problem;
-  fs::copy_file(truth, folder / "truth.json", fs::copy_options::overwrite_existing, problem);
-  if (problem) {
-    return Fail(ErrorCode::kIo, "{} cannot be copied to {}: {}", truth.string(), folder.string(),
-                problem.message());
-  }
-  if (!fs::exists(folder / "report.html") || !fs::exists(folder / "report.json")) {
-    return Fail(ErrorCode::kNotFound, "part {} has no report in {}; {} has the logs", verdict.part,
-                folder.string(), run.string());
-  }
-  fmt::print("report {}\n", folder.string());
-  return {};
-}
-
-// A part that could not be inspected is no result, however well that is reported.
-Status JudgeRun(const std::vector<fsmsg::verdict_t>& verdicts, int parts) {
-  if (static_cast<int>(verdicts.size()) != parts) {
-    return Fail(ErrorCode::kUntrusted, "{} verdicts came for {} parts", verdicts.size(), parts);
-  }
-  for (const fsmsg::verdict_t& verdict : verdicts) {
-    if (verdict.verdict == fsmsg::verdict_t::VERDICT_NOT_INSPECTED ||
-        verdict.verdict == fsmsg::verdict_t::VERDICT_UNKNOWN) {
-      return Fail(ErrorCode::kUntrusted, "part {} was not inspected: {}", verdict.part, verdict.reason);
-    }
-  }
-  return {};
-}
-
 // Returns the verdicts, when the line has sorted every part.
 Result<std::vector<fsmsg::verdict_t>> InspectParts(StationRunner& runner, ProcessGroup& cell,
                                                    const InspectOptions& options, const fs::path& run) {
@@ -209,10 +178,7 @@ Status Inspect(const InspectOptions& options) {
   if (!verdicts.ok()) {
     return verdicts.error();
   }
-  for (const fsmsg::verdict_t& verdict : *verdicts) {
-    RETURN_IF_ERROR(PublishTruth(run, runner->station(), verdict));
-  }
-  return JudgeRun(*verdicts, options.parts);
+  return ShowOutcome(run, runner->station().results, *verdicts, options.parts);
 }
 
 }  // namespace
@@ -226,12 +192,12 @@ void AddInspectCommand(CLI::App& app, Status& outcome) {
   command->add_option("--cell", options.cell, "imperfections of the cell: a file of the station's folder");
   command->add_option("--out", options.out, "folder for the runs");
   command->add_option("--takt", options.takt_s, "seconds from part to part")
-      ->check(CLI::Range(20.0, 3600.0))
+      ->check(FiniteRange(20, 3600))
       ->capture_default_str();
   command->add_option("--scale-divisor", options.scale_divisor, "smaller images; the station must say so too")
       ->check(CLI::IsMember({1, 2, 4, 8}));
   command->add_option("--patience", options.part_patience_s, "seconds a part may take")
-      ->check(CLI::Range(1.0, 1e5));
+      ->check(FiniteRange(1, 1e5));
   command->callback([&outcome] { outcome = Inspect(options); });
 }
 

@@ -17,6 +17,8 @@ constexpr int kCatchUp = 2;                  // a late sender's speed, in multip
 constexpr std::size_t kMemory_frames = 4;
 constexpr std::size_t kBehind_frames = 64;  // what a machine that cannot keep up may owe
 constexpr std::size_t kHistory_frames = 8;
+constexpr std::size_t kMemory_resends = 4096;  // requests; a host asks packet by packet for a lost frame
+constexpr std::uint32_t kUnknownAnswered_packets = 32;  // of a request for a frame that is not kept
 
 iovec Piece(std::span<const std::uint8_t> bytes) {
   return {const_cast<std::uint8_t*>(bytes.data()), bytes.size()};  // sendmmsg does not write
@@ -72,9 +74,21 @@ bool Transmitter::Submit(std::shared_ptr<const GvspFrame> frame) {
 void Transmitter::RequestResend(const ResendRequest& request) {
   {
     const std::lock_guard lock(mutex_);
-    resends_.push_back(request);
+    if (resends_.size() >= kMemory_resends) {
+      return;  // a host asks again
+    }
+    const auto frame = FindSent(request.block_id);
+    const std::uint32_t most = frame != nullptr ? frame->packets() : kUnknownAnswered_packets;
+    ResendRequest& taken = resends_.emplace_back(request);
+    taken.last_packet = request.first_packet + std::min(request.last_packet - request.first_packet, most - 1);
   }
   wake_.notify_one();
+}
+
+std::shared_ptr<const GvspFrame> Transmitter::FindSent(std::uint16_t block_id) const {
+  const auto found = std::find_if(history_.begin(), history_.end(),
+                                  [&](const auto& frame) { return frame->block_id == block_id; });
+  return found != history_.end() ? *found : nullptr;
 }
 
 void Transmitter::Forget() {
@@ -150,14 +164,13 @@ void Transmitter::SendSome() {
 // Resends go before what waits, at the pace of the wire like everything else.
 void Transmitter::ServeResend() {
   ResendRequest& request = resends_.front();
-  const auto found = std::find_if(history_.begin(), history_.end(),
-                                  [&](const auto& frame) { return frame->block_id == request.block_id; });
+  const auto found = FindSent(request.block_id);
   if (history_.empty()) {
     resends_.pop_front();  // nothing was sent since the start: there is not even a host to answer
     return;
   }
-  const bool available = found != history_.end() && !resend_unavailable_;
-  const GvspFrame& frame = available ? **found : *history_.back();
+  const bool available = found != nullptr && !resend_unavailable_;
+  const GvspFrame& frame = available ? *found : *history_.back();
   const std::uint32_t end =
       std::min(request.last_packet + 1, available ? frame.packets() : request.last_packet + 1);
   Batch batch;

@@ -48,6 +48,8 @@ class Transmitter {
   // false: the camera's memory was full when the frame was exposed, or this machine is seconds behind: not
   // taken.
   bool Submit(std::shared_ptr<const GvspFrame> frame);
+  // At most as many packets as the frame has are sent, a few "unavailable" for a frame that is not kept; a
+  // request that finds thousands waiting is dropped. `request` is ordered: first <= last.
   void RequestResend(const ResendRequest& request);
   // Drops what waits, what is being sent and what was sent.
   void Forget();
@@ -60,6 +62,7 @@ class Transmitter {
   void Run();
   bool StartFrame();
   std::int64_t NextSendNs() const;
+  std::shared_ptr<const GvspFrame> FindSent(std::uint16_t block_id) const;
   void SendPaced(Batch& batch, std::int64_t begin_ns);
   void SendSome();
   void ServeResend();

@@ -164,11 +164,19 @@ ViewVisit LiveCell::LatestVisit(int view) const {
 
 Status LiveCell::FollowSorting() {
   for (; sorted_ < line_.sorted().size(); ++sorted_) {
-    const int part = static_cast<int>(line_.sorted()[sorted_].part);
-    const auto state = renderer_.Part(part);
-    if (state == nullptr) {
-      continue;  // a sort command for a part that never was here
+    const std::uint32_t part = line_.sorted()[sorted_].part;
+    if (part >= 1 && part <= static_cast<std::uint32_t>(part_)) {  // others never were here
+      truth_due_.insert(static_cast<int>(part));
     }
+  }
+  for (auto due = truth_due_.begin(); due != truth_due_.end();) {
+    const int part = *due;
+    const auto state = renderer_.Part(part);
+    if (state == nullptr) {  // sorted before the renderer has prepared it
+      ++due;
+      continue;
+    }
+    due = truth_due_.erase(due);
     std::vector<ViewState> views;
     for (const auto& [view, taken] : taken_[part]) {
       views.push_back(taken);

@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 
 #include "drivers/can/can_bus.h"
@@ -73,6 +74,7 @@ class LiveCell {
   std::map<int, int> visits_;                      // by view of part_: how often the robot went there
   std::map<int, std::map<int, ViewState>> taken_;  // by part and view: as rendered
   std::size_t sorted_ = 0;
+  std::set<int> truth_due_;  // parts that were sorted and whose truth is not written
 };
 
 }  // namespace forgescan

@@ -12,6 +12,7 @@
 #include <sstream>
 
 #include "services/common/config/config.h"
+#include "tools/finite_range.h"
 #include "tools/virtual_station/commissioning.h"
 #include "tools/virtual_station/station/live_cell.h"
 #include "tools/virtual_station/station_writer.h"
@@ -57,6 +58,7 @@ Status Prepare(const Arguments& arguments) {
   }
   RETURN_IF_ERROR(WriteWholeFile((run / "cell.toml").string(), cell_text));
   ASSIGN_OR_RETURN(const CellConfig config, LoadCellConfig((run / "cell.toml").string()));
+  RETURN_IF_ERROR(CheckImageSize(config, station_text));
   ASSIGN_OR_RETURN(const std::string commissioned, CommissionedStation(config, station_text));
   RETURN_IF_ERROR(WriteWholeFile((run / "station/station.toml").string(), commissioned));
   return WriteStation(config, ProjectedSet::kReduced, (run / "station").string());
@@ -131,7 +133,7 @@ int main(int argc, char** argv) {
   run->add_option("--run", arguments.run, "folder of the run")->required();
   run->add_option("--parts", arguments.parts, "parts on the line, 0 = for ever")
       ->check(CLI::NonNegativeNumber);
-  run->add_option("--takt-s", arguments.takt_s, "from part to part")->check(CLI::Range(10.0, 3600.0));
+  run->add_option("--takt-s", arguments.takt_s, "from part to part")->check(FiniteRange(10, 3600));
   run->add_flag("--start", arguments.start, "start the line at once");
   prepare->callback([&] { outcome = Prepare(arguments); });
   run->callback([&] { outcome = Run(arguments); });

@@ -91,5 +91,28 @@ TEST_F(TransmitterTest, ResendsAndTheNextFrameShareTheWire) {
   ExpectPaced(second_ns, frame->packets() + 200, PacketNs(*frame));
 }
 
+// A request may name any packet up to 2^24; what it costs is bounded all the same.
+TEST_F(TransmitterTest, AnAbsurdResendRequestIsAnsweredInPart) {
+  const std::int64_t start_ns = MonoNowNs();
+  const auto frame = FrameTo(receiver_);
+  ASSERT_TRUE(transmitter_.Submit(frame));
+  ExpectPaced(start_ns, frame->packets(), PacketNs(*frame));
+  transmitter_.SetFaults(0, true);
+  transmitter_.RequestResend({.block_id = 7, .first_packet = 0, .last_packet = 0xffffff});
+  transmitter_.RequestResend({.block_id = 99, .first_packet = 5, .last_packet = 0xffffff});
+  const std::uint64_t answers = frame->packets() + 32;
+  const std::int64_t asked_ns = MonoNowNs();
+  while (transmitter_.counters().resends_unavailable < answers && MonoNowNs() < asked_ns + kPatience_ns) {
+    std::this_thread::yield();
+  }
+  transmitter_.SetFaults(0, false);
+  transmitter_.RequestResend({.block_id = 7, .first_packet = 1, .last_packet = 1});
+  while (transmitter_.counters().packets_resent < 1 && MonoNowNs() < asked_ns + kPatience_ns) {
+    std::this_thread::yield();
+  }
+  EXPECT_EQ(transmitter_.counters().resends_unavailable, answers);
+  EXPECT_EQ(transmitter_.counters().packets_resent, 1U);
+}
+
 }  // namespace
 }  // namespace forgescan::gige
