@@ -120,22 +120,11 @@ std::string PartInWork::Obstacle() const {
   return "";
 }
 
-std::int64_t PartInWork::EventUtime() const {
-  if (registration.has_value()) {
-    return registration->utime;
-  }
-  if (fusion.has_value()) {
-    return fusion->utime;
-  }
-  return scan.has_value() ? scan->utime : first_utime;
-}
-
 PartReport ReportOf(const PartInWork& work) {
   PartReport report;
   report.part = work.part;
   report.arrived_utime = work.arrived.has_value() ? work.arrived->utime : 0;
-  const bool seen = work.registration.has_value() || work.fusion.has_value() || work.scan.has_value();
-  report.last_view_utime = seen ? work.EventUtime() : 0;
+  report.last_view_utime = work.scan_end_utime.value_or(0);
   if (work.registration.has_value()) {
     report.registration = Reported(*work.registration, work.converged());
     report.reference_degc = work.registration->reference_degc;

@@ -2,7 +2,6 @@
 // verdict, and keeps the report. Several parts may be in work at once. See README.md for channels and faults.
 #pragma once
 
-#include <deque>
 #include <map>
 #include <memory>
 #include <string>
@@ -11,6 +10,7 @@
 #include "fsmsg/part_sorted_t.hpp"
 #include "fsmsg/processing_time_t.hpp"
 #include "fsmsg/service_state_t.hpp"
+#include "services/common/aged_map.h"
 #include "services/common/bus/cloud_stream.h"
 #include "services/common/bus/stream_hub.h"
 #include "services/common/service/service_monitor.h"
@@ -50,9 +50,9 @@ class ReportService {
   };
   // A part that has its verdict.
   struct FinishedPart {
-    int part = 0;
-    std::int64_t utime = 0;  // of its event
-    bool arrived = false;    // its arrival was seen
+    std::int64_t utime = 0;       // of its event
+    std::int64_t last_utime = 0;  // no event of it is later
+    bool arrived = false;         // its arrival was seen
   };
 
   // What the service works with; made by Create().
@@ -78,6 +78,11 @@ class ReportService {
   // The part in work, opened if it is new; nothing if it has its verdict already, or the message is of an
   // earlier part with the number.
   PartInWork* Find(int part, std::int64_t utime);
+  // The part in work whose scan ended then; one whose scan ended earlier gets its verdict. Nothing as above.
+  PartInWork* FindScan(int part, std::int64_t end_utime);
+  // The event is of a part that has its verdict.
+  bool IsLate(int part, std::int64_t utime);
+  PartInWork& OpenPart(int part, std::int64_t utime);
   void FinishIfComplete(int part);
   void Finish(int part);
   // What the part lacks was given up: its stream has a hole, and nothing is under way on it any more.
@@ -97,9 +102,9 @@ class ReportService {
   ServiceTally tally_;
   ReportPages pages_;  // after what it writes with
   CloudAssembler assembler_;
-  std::map<int, Open> open_;           // by part
-  std::deque<FinishedPart> finished_;  // the last ones, oldest first
-  Bus::TimerId loss_timer_ = 0;        // 0 = none set
+  std::map<int, Open> open_;             // by part
+  AgedMap<int, FinishedPart> finished_;  // the last ones, by part
+  Bus::TimerId loss_timer_ = 0;          // 0 = none set
 };
 
 }  // namespace forgescan
