@@ -101,6 +101,9 @@ bool PartInWork::CloudSettled() const {
 bool PartInWork::Complete() const { return fusion.has_value() && CloudSettled(); }
 
 std::string PartInWork::Obstacle() const {
+  if (!stopped.empty()) {
+    return stopped;
+  }
   if (registration.has_value() && !converged()) {
     return registration->reason.empty()
                ? fmt::format("The registration ended with status {} and gave no reason.",

@@ -24,6 +24,7 @@ struct PartInWork {
   std::int64_t ignore_before_utime = std::numeric_limits<std::int64_t>::min();  // older is of an earlier part
   // us since 1970 UTC; results with another end of the scan are of another part with the number.
   std::optional<std::int64_t> scan_end_utime;
+  std::string stopped;  // why nothing is measured, whatever is here; empty = nothing against it
   std::optional<fsmsg::part_arrived_t> arrived;
   std::optional<fsmsg::scan_complete_t> scan;
   std::optional<fsmsg::fusion_result_t> fusion;

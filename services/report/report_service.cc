@@ -50,8 +50,10 @@ ReportService::ReportService(StreamHub& hub, ServiceMonitor& monitor, Parts part
 }
 
 ReportService::~ReportService() {
-  for (const auto& [part, open] : open_) {
-    hub_.bus().Cancel(open.timeout);
+  while (!open_.empty()) {
+    const auto first = open_.begin();
+    first->second.work.stopped = "The service was stopped before the part was judged.";
+    GiveVerdict(first->first);
   }
   hub_.bus().Cancel(loss_timer_);
 }
@@ -228,6 +230,11 @@ PartReport ReportService::Judge(const PartInWork& work) const {
 }
 
 void ReportService::Finish(int part) {
+  GiveVerdict(part);
+  TellState();
+}
+
+void ReportService::GiveVerdict(int part) {
   const std::int64_t started_us = hub_.bus().NowUs();
   JudgedPart judged;
   judged.work = std::move(open_.at(part).work);
@@ -248,7 +255,6 @@ void ReportService::Finish(int part) {
   judged.folder_name = ReportFolderName(part, utime);
   Publish(report, utime);
   pages_.Add(std::move(judged));
-  TellState();
 }
 
 // What goes wrong with files is told, but never keeps the verdict from the line.

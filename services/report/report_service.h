@@ -40,7 +40,7 @@ class ReportService {
                                                        const PartEvaluator& evaluator);
   ReportService(const ReportService&) = delete;
   ReportService& operator=(const ReportService&) = delete;
-  // Writes the pages that are still due.
+  // Gives the parts in work their verdict, NOT_INSPECTED, and writes the pages that are still due.
   ~ReportService();
 
  private:
@@ -85,6 +85,7 @@ class ReportService {
   PartInWork& OpenPart(int part, std::int64_t utime);
   void FinishIfComplete(int part);
   void Finish(int part);
+  void GiveVerdict(int part);
   // What the part lacks was given up: its stream has a hole, and nothing is under way on it any more.
   bool WaitsInVain(const PartInWork& work) const;
   void FinishWhatWaitsInVain();
