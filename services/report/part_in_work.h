@@ -33,7 +33,7 @@ struct PartInWork {
   std::optional<PointCloud> cloud_in_model;
   std::string cloud_error;  // why the cloud cannot be used; empty = nothing wrong so far
   std::map<std::string, std::int64_t> duration_us;  // by step, summed over the views
-  ServiceSums sums_at_opening;
+  std::optional<ServiceSums> sums_at_opening;
   bool fusion_hole = false;  // results of the fusion were given up meanwhile, of this part or of others
   bool cloud_hole = false;   // slices of registered clouds were
 

@@ -41,6 +41,7 @@ ReportService::ReportService(StreamHub& hub, ServiceMonitor& monitor, Parts part
       station_(std::move(parts.station)),
       writer_(std::move(parts.writer)),
       evaluator_(evaluator),
+      tally_(station_.services),
       pages_(hub.bus(), monitor, station_.name, {config_, writer_, evaluator_, tally_}),
       finished_(kFinishedParts) {
   Subscribe();

@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "fsmsg/part_sorted_t.hpp"
 #include "fsmsg/processing_time_t.hpp"
@@ -29,6 +30,7 @@ struct ReportStation {
   std::string software_version;
   std::string config_hash;
   std::string results_folder;
+  std::vector<std::string> services;  // by name; a loss is known once each of them was heard
 };
 
 class ReportService {

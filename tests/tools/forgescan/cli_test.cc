@@ -13,6 +13,8 @@
 #include <random>
 
 #include "services/common/geometry/cloud_io.h"
+#include "services/common/service/station.h"
+#include "tools/forgescan/station/station_services.h"
 
 namespace forgescan {
 namespace {
@@ -273,6 +275,14 @@ TEST_F(Cli, AnUnknownCommandIsAUsageError) {
   const Output output = Call("melt");
   EXPECT_NE(output.exit_code, 0);
   EXPECT_NE(output.text.find("subcommand is required"), std::string::npos) << output.text;
+}
+
+TEST(StationServices, AreThoseThatTheReportWaitsFor) {
+  std::vector<std::string> started;
+  for (const StationService& service : StationServices()) {
+    started.push_back(service.name);
+  }
+  EXPECT_EQ(started, std::vector<std::string>(kServiceNames.begin(), kServiceNames.end()));
 }
 
 }  // namespace
