@@ -221,7 +221,7 @@ void FusionService::Finish(int part, PartCollector& collector) {
   result.views = std::move(views.summary);
   result.view_count = static_cast<std::int32_t>(result.views.size());
   Publish(std::move(result), cloud);
-  timer.Finish(kFusionTime, monitor_);
+  timer.Finish(kFusionTime, monitor_, views.scan_utime);
 }
 
 void FusionService::Publish(fsmsg::fusion_result_t result, const PointCloud& cloud) {

@@ -210,7 +210,7 @@ void ReconstructionService::Finish(Key key, const ViewCollector& view) {
   if (const Status sent = Publish(result, cloud); !sent.ok()) {
     monitor_.ReportError(sent.error());
   }
-  timer.Finish(kReconstructionTime, monitor_);
+  timer.Finish(kReconstructionTime, monitor_, result.utime);
 }
 
 Status ReconstructionService::Publish(const fsmsg::view_result_t& result, const PointCloud& cloud) {

@@ -164,7 +164,7 @@ void RegistrationService::Finish(const fsmsg::fusion_result_t& fusion, const Poi
   if (const Status sent = Publish(message, cloud_in_model); !sent.ok()) {
     monitor_.ReportError(sent.error());
   }
-  timer.Finish(kRegistrationTime, monitor_);
+  timer.Finish(kRegistrationTime, monitor_, message.utime);
 }
 
 Status RegistrationService::Publish(const Message& message, const PointCloud& cloud_in_model) {

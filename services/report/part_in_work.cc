@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "fsmsg/view_result_t.hpp"
 
 namespace forgescan {
@@ -121,6 +123,13 @@ std::string PartInWork::Obstacle() const {
                        cloud_in_model->size());
   }
   return "";
+}
+
+bool PartInWork::Covers(std::int64_t utime) const {
+  const std::int64_t start_utime = scan.has_value()     ? scan->scan_start_utime
+                                   : fusion.has_value() ? fusion->scan_start_utime
+                                                        : first_utime;
+  return utime >= std::min(start_utime, first_utime) && utime <= EventUtime();
 }
 
 PartReport ReportOf(const PartInWork& work) {

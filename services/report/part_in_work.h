@@ -47,6 +47,8 @@ struct PartInWork {
   // us since 1970 UTC, of the end of the scan; of the earliest event where that is not known. Never the time
   // of arrival at this service, so that a replay gives the same.
   std::int64_t EventUtime() const { return scan_end_utime.value_or(first_utime); }
+  // An event of this time lies within the part's scan, as far as it is known.
+  bool Covers(std::int64_t utime) const;
 };
 
 // The part of the report that is a copy of the messages: registration, views, frames, times of the part.

@@ -12,6 +12,8 @@ namespace {
 
 constexpr std::size_t kFinishedParts = 1000;  // a message later than that opens its part anew, and times out
 constexpr double kUsPerSecond = 1e6;
+// A view that is being exposed when a scan is broken off is finished, and so is later than the scan's end.
+constexpr std::int64_t kAfterScanUs = 10'000'000;
 
 // "parts_ok", "parts_not_ok", ...
 std::string CounterName(Verdict verdict) {
@@ -138,11 +140,7 @@ void ReportService::OnSlice(const fsmsg::cloud_slice_t& message) {
 }
 
 void ReportService::OnDuration(const fsmsg::processing_time_t& message) {
-  const auto open = open_.find(message.part);
-  const bool of_open = open != open_.end() && message.utime >= open->second.work.ignore_before_utime;
-  PartInWork* judged = of_open ? nullptr : pages_.Find(message.part);
-  PartInWork* work = judged != nullptr ? judged : Find(message.part, message.utime);
-  if (work != nullptr) {
+  if (PartInWork* work = FindStep(message.part, message.utime); work != nullptr) {
     work->duration_us[message.step] += message.duration_us;
   }
 }
@@ -182,6 +180,17 @@ PartInWork* ReportService::FindScan(int part, std::int64_t end_utime) {
     work->scan_end_utime = end_utime;
   }
   return work;
+}
+
+PartInWork* ReportService::FindStep(int part, std::int64_t utime) {
+  PartInWork* judged = pages_.Find(part);
+  if (judged != nullptr && judged->Covers(utime)) {
+    return judged;
+  }
+  const auto open = open_.find(part);
+  const bool late = open == open_.end() ? IsLate(part, utime - kAfterScanUs)
+                                        : utime > open->second.work.scan_end_utime.value_or(utime);
+  return late ? nullptr : Find(part, utime);
 }
 
 bool ReportService::IsLate(int part, std::int64_t utime) {

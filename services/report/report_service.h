@@ -82,6 +82,8 @@ class ReportService {
   PartInWork* Find(int part, std::int64_t utime);
   // The part in work whose scan ended then; one whose scan ended earlier gets its verdict. Nothing as above.
   PartInWork* FindScan(int part, std::int64_t end_utime);
+  // The part in work, or with its page still due, that a step worked on; nothing as above.
+  PartInWork* FindStep(int part, std::int64_t utime);
   // The event is of a part that has its verdict.
   bool IsLate(int part, std::int64_t utime);
   PartInWork& OpenPart(int part, std::int64_t utime);

@@ -155,6 +155,17 @@ TEST_F(FinishedPartsTest, AViewThatEndsSoonAfterItsScanBeginsNoPart) {
   EXPECT_EQ(monitor_.counter("messages_late"), 3);
 }
 
+TEST_F(FinishedPartsTest, TheDurationCarriesTheTimeOfItsResult) {
+  std::vector<fsmsg::processing_time_t> times;
+  listener_.Subscribe<fsmsg::processing_time_t>(kFusionTime,
+                                                [&times](const auto& time) { times.push_back(time); });
+  Start();
+  Part(1);
+  ASSERT_EQ(results_.size(), 1U);
+  ASSERT_EQ(times.size(), 1U);
+  EXPECT_EQ(times[0].utime, results_[0].utime);
+}
+
 TEST_F(FinishedPartsTest, AClockSetBackMakesNoDifferenceToThat) {
   Start();
   Part(1);

@@ -169,10 +169,16 @@ TEST_F(FinishedViewsTest, TheTimeoutOfAnEarlierPartIsNotTheNextOnes) {
 }
 
 TEST_F(FinishedViewsTest, AViewWithoutAFrameHasATimeAllTheSame) {
+  std::vector<fsmsg::processing_time_t> times;
+  listener_.Subscribe<fsmsg::processing_time_t>(kReconstructionTime,
+                                                [&times](const auto& time) { times.push_back(time); });
+  network_.RunFor(kSecondUs);
   const std::int64_t captured_utime = network_.NowUs();
   Captured(1, 7);
   ASSERT_EQ(results_.size(), 1U);
   EXPECT_EQ(results_[0].utime, captured_utime);
+  ASSERT_EQ(times.size(), 1U);
+  EXPECT_EQ(times[0].utime, captured_utime);
 }
 
 TEST_F(FinishedViewsTest, AnotherNumberOfPatternsThanInTheFileIsNamedWithBoth) {

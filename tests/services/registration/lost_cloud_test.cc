@@ -147,6 +147,18 @@ TEST_F(LostCloudTest, APartThatIsDoneTakesNoHoleFromOneThatWaits) {
   EXPECT_THAT(results_[2].reason, ::testing::Not(HasSubstr("are lost")));
 }
 
+TEST_F(LostCloudTest, TheDurationCarriesTheTimeOfItsResult) {
+  std::vector<fsmsg::processing_time_t> times;
+  listener_.Subscribe<fsmsg::processing_time_t>(kRegistrationTime,
+                                                [&times](const auto& time) { times.push_back(time); });
+  network_.RunFor(kSecondUs);
+  Slices(1, 2, kFirst);
+  Fused(1, kFirst);
+  network_.RunFor(kSecondUs);
+  ASSERT_EQ(times.size(), 1U);
+  EXPECT_EQ(times[0].utime, kFirst);
+}
+
 TEST(RegistrationConfigRange, AStartBeyondWhatTheRegistrationAllowsIsRefusedByItsKey) {
   const auto file = ConfigFile::Parse("[registration]\nstart_rotation_rad = 0.6\n", "station.toml");
   ASSERT_TRUE(file.ok());

@@ -158,15 +158,36 @@ TEST_F(ReportSameNumberTest, AndIsNotInspectedIfNothingMoreComesOfIt) {
   EXPECT_EQ(verdicts_[1].verdict, fsmsg::verdict_t::VERDICT_NOT_INSPECTED);
 }
 
+// A duration carries the time of what the step worked on: a view, or the end of the scan.
 TEST_F(ReportSameNumberTest, DurationsGoToThePartTheyAreOf) {
   SendGood(1);
   network_.RunFor(1000);
   ArriveAgain(kLaterUs);
-  SendDuration(kFusionTime, "fusion", 1, 80'000);  // of the earlier part, whose page is still due
+  SendDuration(kReconstructionTime, "reconstruction", 1, 30'000, -10 * kSecondUs);  // of the earlier part,
+  SendDuration(kFusionTime, "fusion", 1, 80'000);                                   // whose page is still due
+  SendDuration(kReconstructionTime, "reconstruction", 1, 500'000, kLaterUs - 10 * kSecondUs);
+  MeasureAgain(kLaterUs);
+  SendDuration(kRegistrationTime, "registration", 1, 310'000, kLaterUs);
+  network_.RunFor(3 * kSecondUs);
+  ASSERT_EQ(verdicts_.size(), 2u);
+  const nlohmann::json first = ReadJson(verdicts_[0])["timing_s"],
+                       second = ReadJson(verdicts_[1])["timing_s"];
+  EXPECT_EQ(first["reconstruction"], 0.03);
+  EXPECT_EQ(first["fusion"], 0.08);
+  EXPECT_TRUE(first["registration"].is_null());
+  EXPECT_EQ(second["reconstruction"], 0.5);
+  EXPECT_TRUE(second["fusion"].is_null());
+  EXPECT_EQ(second["registration"], 0.31);
+}
+
+TEST_F(ReportSameNumberTest, ADurationOfAPartThatIsDoneAndWrittenIsNotTheNextOnes) {
+  SendGood(1);
+  network_.RunFor(3 * kSecondUs);
+  ArriveAgain(kLaterUs);
+  SendDuration(kFusionTime, "fusion", 1, 80'000);
   MeasureAgain(kLaterUs);
   network_.RunFor(3 * kSecondUs);
   ASSERT_EQ(verdicts_.size(), 2u);
-  EXPECT_EQ(ReadJson(verdicts_[0])["timing_s"]["fusion"], 0.08);
   EXPECT_TRUE(ReadJson(verdicts_[1])["timing_s"]["fusion"].is_null());
 }
 

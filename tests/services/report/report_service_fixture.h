@@ -127,10 +127,11 @@ class ReportServiceTest : public ::testing::Test {
     SendCloud(part);
     SendRegistration(part, fsmsg::registration_t::STATUS_CONVERGED);
   }
+  // offset_us: of what the step worked on, against the end of the scan.
   void SendDuration(const Channel<fsmsg::processing_time_t>& channel, const char* step, int part,
-                    std::int64_t us) {
+                    std::int64_t us, std::int64_t offset_us = 0) {
     fsmsg::processing_time_t message{};
-    message.utime = Fusion(part).utime;
+    message.utime = Fusion(part).utime + offset_us;
     message.part = part;
     message.step = step;
     message.duration_us = us;
