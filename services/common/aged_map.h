@@ -44,6 +44,13 @@ class AgedMap {
     entries_.erase(found);
     return taken;
   }
+  // action(key, value), oldest first.
+  template <typename Action>
+  void ForEach(Action action) {
+    for (auto& [key, value] : entries_) {
+      action(key, value);
+    }
+  }
   template <typename Condition>
   void EraseIf(Condition condition) {
     std::erase_if(entries_, [&](const Entry& entry) { return condition(entry.first); });

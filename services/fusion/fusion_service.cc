@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <limits>
 
 #include "services/common/bus/channels.h"
 #include "services/common/service/step_timer.h"
@@ -12,6 +13,9 @@ namespace {
 
 constexpr std::size_t kMaxPartsInWork = 8;
 constexpr std::size_t kFinishedKept = 64;
+constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::min();
+// A view that is being exposed when a scan is broken off is finished, and so is later than the scan's end.
+constexpr std::int64_t kAfterScanUs = 10'000'000;
 
 }  // namespace
 
@@ -48,23 +52,32 @@ FusionService::FusionService(StreamHub& hub, ServiceMonitor& monitor, FusionConf
 
 template <typename Message>
 PartCollector* FusionService::Part(const Message& message) {
-  if (finished_.Find(message.part) != nullptr) {
-    monitor_.Count("messages_late");
-    return nullptr;
-  }
-  if (parts_.Find(message.part) == nullptr) {
-    if (const auto dropped = parts_.Insert(message.part, PartCollector())) {
-      monitor_.ReportError(
-          Fail(ErrorCode::kUntrusted, "part {} never finished and is dropped", dropped->first));
-      assembler_.Forget(dropped->first);
-    }
-  }
+  const Finished* finished = finished_.Find(message.part);
+  std::int64_t late_utime = finished != nullptr ? finished->utime + kAfterScanUs : kNever;
   PartCollector* part = parts_.Find(message.part);
-  if (!part->Admits(message.utime)) {
+  if (part != nullptr && part->scan().has_value() && message.utime > part->scan()->utime + kAfterScanUs) {
+    late_utime = part->scan()->utime + kAfterScanUs;
+    part = nullptr;
+    Drop(message.part);
+  }
+  if (part == nullptr && message.utime > late_utime) {
+    part = &Begin(message.part);
+    part->IgnoreBefore(late_utime + 1);
+  }
+  if (part == nullptr || !part->Admits(message.utime)) {
     monitor_.Count("messages_late");
     return nullptr;
   }
   return part;
+}
+
+PartCollector& FusionService::Begin(int part) {
+  if (const auto dropped = parts_.Insert(part, PartCollector())) {
+    monitor_.ReportError(
+        Fail(ErrorCode::kUntrusted, "part {} never finished and is dropped", dropped->first));
+    assembler_.Forget(dropped->first);
+  }
+  return *parts_.Find(part);
 }
 
 // The line counts from the beginning again: two arrivals of a number are two parts, and so is an arrival
@@ -79,12 +92,15 @@ bool FusionService::EndEarlierPart(const fsmsg::part_arrived_t& arrived) {
   if (open == nullptr || !open->IsBefore(arrived)) {
     return false;
   }
-  parts_.Take(arrived.part);
-  assembler_.Forget(arrived.part);
-  monitor_.ReportError(Fail(ErrorCode::kUntrusted,
-                            "part {} never finished and is dropped: another with its number has arrived",
-                            arrived.part));
+  Drop(arrived.part);
   return true;
+}
+
+void FusionService::Drop(int part) {
+  parts_.Take(part);
+  assembler_.Forget(part);
+  monitor_.ReportError(Fail(ErrorCode::kUntrusted,
+                            "part {} never finished and is dropped: another with its number has come", part));
 }
 
 void FusionService::OnArrived(const fsmsg::part_arrived_t& arrived) {
@@ -205,7 +221,7 @@ void FusionService::Finish(int part, PartCollector& collector) {
   result.views = std::move(views.summary);
   result.view_count = static_cast<std::int32_t>(result.views.size());
   Publish(std::move(result), cloud);
-  timer.Finish(kFusionTime, monitor_);
+  timer.Finish(kFusionTime, monitor_, views.scan_utime);
 }
 
 void FusionService::Publish(fsmsg::fusion_result_t result, const PointCloud& cloud) {

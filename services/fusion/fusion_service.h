@@ -27,6 +27,9 @@ class FusionService {
   // still comes of it must not begin it again.
   template <typename Message>
   PartCollector* Part(const Message& message);
+  PartCollector& Begin(int part);
+  // The part never finished, and another with its number has come.
+  void Drop(int part);
   // Drops what is left of an earlier part with the number. True if there was one.
   bool EndEarlierPart(const fsmsg::part_arrived_t& arrived);
   void OnArrived(const fsmsg::part_arrived_t& arrived);

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "services/common/bus/channels.h"
 #include "services/common/bus/cloud_stream.h"
 #include "services/common/service/step_timer.h"
@@ -51,10 +53,12 @@ ReconstructionService::ReconstructionService(StreamHub& hub, ServiceMonitor& mon
       pattern_(std::move(pattern)),
       calibration_(std::move(calibration)),
       views_(kMaxViewsInWork),
-      finished_(kFinishedKept) {
+      finished_(kFinishedKept),
+      arrived_(kFinishedKept) {
   hub_.Advertise(kViewCloud);
   hub_.Advertise(kViewResult);
   hub_.Advertise(kReconstructionTime);
+  hub_.Subscribe<fsmsg::part_arrived_t>(kPartArrived, [this](const auto& arrived) { OnArrived(arrived); });
   hub_.Subscribe<fsmsg::view_captured_t>(kViewCaptured,
                                          [this](const auto& captured) { OnCaptured(captured); });
   const auto on_frame = [this](const fsmsg::frame_t& frame) {
@@ -76,8 +80,41 @@ ReconstructionService::ReconstructionService(StreamHub& hub, ServiceMonitor& mon
   monitor_.SetState(ServiceState::kReady, "waiting for frames");
 }
 
-// The rest of a view is exposed and sent within the timeout of its frames; the same numbers later are another
-// part, counted from the beginning again.
+// The line counts from the beginning again: what is older than the arrival is an earlier part's. On a clock
+// that was set back meanwhile, what is younger than the arrival before is.
+void ReconstructionService::OnArrived(const fsmsg::part_arrived_t& arrived) {
+  const std::int64_t* before = arrived_.Find(arrived.part);
+  const bool set_back = before != nullptr && arrived.utime < *before;
+  const std::int64_t limit_utime = set_back ? *before : arrived.utime;
+  const auto is_earlier = [&](Key key, std::int64_t utime) {
+    return key.first == arrived.part && (set_back ? utime >= limit_utime : utime < limit_utime);
+  };
+  std::vector<Key> open, finished;
+  views_.ForEach([&](Key key, const ViewCollector& view) {
+    if (is_earlier(key, view.newest_utime())) {
+      open.push_back(key);
+    }
+  });
+  finished_.ForEach([&](Key key, const Finished& view) {
+    if (is_earlier(key, view.utime)) {
+      finished.push_back(key);
+    }
+  });
+  std::ranges::for_each(open, [this](Key key) { Drop(key); });
+  std::ranges::for_each(finished, [this](Key key) { finished_.Take(key); });
+  arrived_.Insert(arrived.part, arrived.utime);
+}
+
+void ReconstructionService::Drop(Key key) {
+  views_.Take(key);
+  monitor_.ReportError(
+      Fail(ErrorCode::kUntrusted,
+           "part {} view {} never finished and is dropped: another with its numbers has come", key.first,
+           key.second));
+}
+
+// A view's events lie within the timeout of its frames; the same numbers later are another part, whose
+// arrival was not seen.
 bool ReconstructionService::IsFinished(Key key, int attempt, std::int64_t utime) {
   const Finished* finished = finished_.Find(key);
   return finished != nullptr && attempt <= finished->attempt &&
@@ -87,9 +124,14 @@ bool ReconstructionService::IsFinished(Key key, int attempt, std::int64_t utime)
 template <typename Message>
 ViewCollector* ReconstructionService::View(const Message& message) {
   const Key key{message.part, message.view};
-  if (IsFinished(key, message.attempt, message.utime)) {
+  const std::int64_t* arrived = arrived_.Find(message.part);
+  if ((arrived != nullptr && message.utime < *arrived) || IsFinished(key, message.attempt, message.utime)) {
     monitor_.Count("messages_late");
     return nullptr;
+  }
+  const ViewCollector* open = views_.Find(key);
+  if (open != nullptr && message.utime > open->newest_utime() + ToUs(config_.frame_timeout_s)) {
+    Drop(key);
   }
   if (views_.Find(key) == nullptr) {
     if (const auto dropped = views_.Insert(key, ViewCollector(pattern_.frame_count()))) {
@@ -108,9 +150,9 @@ void ReconstructionService::OnCaptured(const fsmsg::view_captured_t& captured) {
   const Key key{captured.part, captured.view};
   view->OnCaptured(captured);
   const std::int64_t timeout_us = ToUs(config_.frame_timeout_s);
-  hub_.bus().At(hub_.bus().NowUs() + timeout_us, [this, key, attempt = captured.attempt] {
+  hub_.bus().At(hub_.bus().NowUs() + timeout_us, [this, key, utime = captured.utime] {
     ViewCollector* late = views_.Find(key);
-    if (late != nullptr && late->attempt() == attempt) {
+    if (late != nullptr && late->captured_utime() == utime) {
       late->Expire(fmt::format("{} of {} frames came within {} s", late->frames_received(),
                                2 * pattern_.frame_count(), config_.frame_timeout_s));
       FinishIfSettled(key);
@@ -123,7 +165,7 @@ void ReconstructionService::FinishIfSettled(Key key) {
   const ViewCollector* view = views_.Find(key);
   if (view != nullptr && view->state() != ViewCollector::State::kCollecting) {
     const auto settled = views_.Take(key);
-    finished_.Insert(key, {settled->attempt(), hub_.bus().NowUs()});
+    finished_.Insert(key, {settled->attempt(), settled->newest_utime()});
     Finish(key, *settled);
   }
 }
@@ -168,7 +210,7 @@ void ReconstructionService::Finish(Key key, const ViewCollector& view) {
   if (const Status sent = Publish(result, cloud); !sent.ok()) {
     monitor_.ReportError(sent.error());
   }
-  timer.Finish(kReconstructionTime, monitor_);
+  timer.Finish(kReconstructionTime, monitor_, result.utime);
 }
 
 Status ReconstructionService::Publish(const fsmsg::view_result_t& result, const PointCloud& cloud) {

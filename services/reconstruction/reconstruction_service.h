@@ -4,6 +4,7 @@
 #include <memory>
 #include <utility>
 
+#include "fsmsg/part_arrived_t.hpp"
 #include "fsmsg/view_result_t.hpp"
 #include "services/common/aged_map.h"
 #include "services/common/config/config.h"
@@ -34,12 +35,16 @@ class ReconstructionService {
   // A view that has its result. What still comes of it must not begin it again.
   struct Finished {
     int attempt = 0;
-    std::int64_t utime = 0;
+    std::int64_t utime = 0;  // of its newest event
   };
 
-  // The view a message belongs to; nothing if that view is finished.
+  // The view a message belongs to; nothing if that view is finished, or is an earlier part's.
   template <typename Message>
   ViewCollector* View(const Message& message);
+  // Drops what is left of an earlier part with the number.
+  void OnArrived(const fsmsg::part_arrived_t& arrived);
+  // Drops a view that never finished: another with its numbers has come.
+  void Drop(Key key);
   bool IsFinished(Key key, int attempt, std::int64_t utime);
   void OnCaptured(const fsmsg::view_captured_t& captured);
   void FinishIfSettled(Key key);
@@ -56,6 +61,7 @@ class ReconstructionService {
   ImageSize image_size_{};                        // for which it was made
   AgedMap<Key, ViewCollector> views_;             // in work
   AgedMap<Key, Finished> finished_;
+  AgedMap<int, std::int64_t> arrived_;  // utime of the last arrival of a part's number
 };
 
 }  // namespace forgescan

@@ -6,10 +6,13 @@
 
 namespace forgescan {
 
-bool ViewCollector::IsCurrent(int attempt) {
+bool ViewCollector::IsCurrent(int attempt, std::int64_t utime) {
   if (attempt > attempt_) {
     *this = ViewCollector(frames_per_camera_);
     attempt_ = attempt;
+  }
+  if (attempt == attempt_) {
+    newest_utime_ = std::max(newest_utime_, utime);
   }
   return attempt == attempt_;
 }
@@ -34,9 +37,10 @@ void ViewCollector::CheckPatterns(int fired) {
 }
 
 void ViewCollector::OnCaptured(const fsmsg::view_captured_t& captured) {
-  if (!IsCurrent(captured.attempt)) {
+  if (!IsCurrent(captured.attempt, captured.utime)) {
     return;
   }
+  captured_utime_ = captured.utime;
   if (captured.status != fsmsg::view_captured_t::STATUS_CAPTURED) {
     SetVoid(captured.reason.empty() ? "the capture is void" : captured.reason);
   } else {
@@ -46,7 +50,7 @@ void ViewCollector::OnCaptured(const fsmsg::view_captured_t& captured) {
 
 void ViewCollector::OnManifest(const fsmsg::view_frames_t& manifest) {
   Camera* camera = CameraOf(manifest.camera);
-  if (camera == nullptr || !IsCurrent(manifest.attempt)) {
+  if (camera == nullptr || !IsCurrent(manifest.attempt, manifest.utime)) {
     return;
   }
   camera->manifest = manifest;
@@ -61,7 +65,7 @@ void ViewCollector::OnManifest(const fsmsg::view_frames_t& manifest) {
 
 void ViewCollector::OnFrame(const fsmsg::frame_t& frame) {
   Camera* camera = CameraOf(frame.camera);
-  if (camera == nullptr || !IsCurrent(frame.attempt)) {
+  if (camera == nullptr || !IsCurrent(frame.attempt, frame.utime)) {
     return;
   }
   const bool shaped = frame.width_px > 0 && frame.height_px > 0 &&
@@ -103,7 +107,7 @@ std::int64_t ViewCollector::middle_utime() const {
       last = std::max(last, frame.utime);
     }
   }
-  return first + (last - first) / 2;
+  return last == 0 ? newest_utime_ : first + (last - first) / 2;
 }
 
 std::vector<const fsmsg::frame_t*> ViewCollector::Frames(int camera) const {

@@ -36,8 +36,12 @@ class ViewCollector {
   State state() const;
   const std::string& void_reason() const { return void_reason_; }
   int frames_received() const;
-  // Middle of the view's exposures; 0 without a frame.
+  // us since 1970 UTC, middle of the view's exposures; of the newest event of the view without a frame.
   std::int64_t middle_utime() const;
+  // us since 1970 UTC, of the newest event of the view; 0 without one.
+  std::int64_t newest_utime() const { return newest_utime_; }
+  // us since 1970 UTC, of the end of the capture; 0 until it is told.
+  std::int64_t captured_utime() const { return captured_utime_; }
   int attempt() const { return attempt_; }
   // Frames of a camera (exposure_t.CAMERA_*) in the order of the projected sequence. Only when complete.
   std::vector<const fsmsg::frame_t*> Frames(int camera) const;
@@ -47,8 +51,9 @@ class ViewCollector {
     std::map<int, fsmsg::frame_t> frames;  // by pattern
     std::optional<fsmsg::view_frames_t> manifest;
   };
-  // True if the event belongs to the newest attempt; a newer one starts the collection afresh.
-  bool IsCurrent(int attempt);
+  // True if the event belongs to the newest attempt, and notes its time; a newer attempt starts the
+  // collection afresh.
+  bool IsCurrent(int attempt, std::int64_t utime);
   Camera* CameraOf(int camera);
   void SetVoid(const std::string& reason);
   // fired: pulses of each camera as the trigger counts them.
@@ -56,6 +61,8 @@ class ViewCollector {
 
   int frames_per_camera_;
   int attempt_ = 0;
+  std::int64_t newest_utime_ = 0;
+  std::int64_t captured_utime_ = 0;
   std::array<Camera, 2> cameras_;  // left, right
   std::string void_reason_;
 };

@@ -55,11 +55,7 @@ RegistrationService::RegistrationService(StreamHub& hub, ServiceMonitor& monitor
   hub_.Advertise(kRegistrationTime);
   hub_.Subscribe<fsmsg::cloud_slice_t>(kFusedCloud, [this](const auto& slice) { OnSlice(slice); });
   hub_.Subscribe<fsmsg::fusion_result_t>(kFusionResult, [this](const auto& fusion) { OnFusion(fusion); });
-  hub_.OnLost(kFusedCloud, [this](std::int64_t first, std::int64_t last) {
-    lost_ = fmt::format("; slices {} to {} of the fused clouds are lost", first, last);
-    monitor_.ReportError(
-        Fail(ErrorCode::kUnavailable, "slices {} to {} of the fused clouds are lost", first, last));
-  });
+  hub_.OnLost(kFusedCloud, [this](std::int64_t first, std::int64_t last) { OnLost(first, last); });
   monitor_.SetState(ServiceState::kReady, "waiting for a part");
 }
 
@@ -72,6 +68,13 @@ RegistrationService::Part& RegistrationService::InWork(Key key) {
     }
   }
   return *parts_.Find(key);
+}
+
+// The slices may have been any waiting part's.
+void RegistrationService::OnLost(std::int64_t first, std::int64_t last) {
+  const std::string lost = fmt::format("slices {} to {} of the fused clouds are lost", first, last);
+  parts_.ForEach([&lost](Key, Part& part) { part.lost = "; " + lost; });
+  monitor_.ReportError(Fail(ErrorCode::kUnavailable, "{}", lost));
 }
 
 void RegistrationService::OnSlice(const fsmsg::cloud_slice_t& slice) {
@@ -104,8 +107,8 @@ void RegistrationService::GiveUp(Key key) {
   assembler_.Forget(key.first, key.second);
   Message message = NoPose(*taken->fusion);
   message.status = Message::STATUS_FAILED;
-  message.reason =
-      fmt::format("the fused cloud is not whole {} s after its result{}", config_.cloud_timeout_s, lost_);
+  message.reason = fmt::format("the fused cloud is not whole {} s after its result{}",
+                               config_.cloud_timeout_s, taken->lost);
   if (const Status sent = Publish(message, {}); !sent.ok()) {
     monitor_.ReportError(sent.error());
   }
@@ -121,7 +124,6 @@ void RegistrationService::FinishIfComplete(Key key) {
     return;
   }
   const auto taken = parts_.Take(key);
-  lost_.clear();  // whatever it was, it did not hold up this part
   Finish(*taken->fusion, taken->cloud_in_array.value_or(PointCloud()));
 }
 
@@ -162,7 +164,7 @@ void RegistrationService::Finish(const fsmsg::fusion_result_t& fusion, const Poi
   if (const Status sent = Publish(message, cloud_in_model); !sent.ok()) {
     monitor_.ReportError(sent.error());
   }
-  timer.Finish(kRegistrationTime, monitor_);
+  timer.Finish(kRegistrationTime, monitor_, message.utime);
 }
 
 Status RegistrationService::Publish(const Message& message, const PointCloud& cloud_in_model) {

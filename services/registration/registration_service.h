@@ -23,12 +23,14 @@ class RegistrationService {
   struct Part {
     std::optional<PointCloud> cloud_in_array;
     std::optional<fsmsg::fusion_result_t> fusion;
+    std::string lost;  // the last slices the bus gave up while the part waited; empty = none
   };
 
   // Number and time of the scan's end: a line that counts from 1 again makes other parts with old numbers.
   using Key = std::pair<int, std::int64_t>;
 
   Part& InWork(Key key);
+  void OnLost(std::int64_t first, std::int64_t last);
   void OnFusion(const fsmsg::fusion_result_t& fusion);
   void OnSlice(const fsmsg::cloud_slice_t& slice);
   void FinishIfComplete(Key key);
@@ -45,7 +47,6 @@ class RegistrationService {
   RegistrationModel model_;
   CloudAssembler assembler_;
   AgedMap<Key, Part> parts_;  // in work
-  std::string lost_;          // the last slices the bus gave up; empty = none
 };
 
 }  // namespace forgescan

@@ -17,7 +17,11 @@ Result<std::shared_ptr<void>> Make(const ServiceContext& context) {
   auto program = std::make_shared<Program>();
   ASSIGN_OR_RETURN(program->evaluator,
                    ModelEvaluator::Load(station.model, station.features, config.dimensions));
-  const ReportStation shown{station.name, FORGESCAN_VERSION, station.file.hash(), station.results};
+  const ReportStation shown{station.name,
+                            FORGESCAN_VERSION,
+                            station.file.hash(),
+                            station.results,
+                            {kServiceNames.begin(), kServiceNames.end()}};
   ASSIGN_OR_RETURN(program->service,
                    ReportService::Create(context.hub, context.monitor, config, shown, *program->evaluator));
   return std::shared_ptr<void>(program);

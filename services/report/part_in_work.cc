@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "fsmsg/view_result_t.hpp"
 
 namespace forgescan {
@@ -101,6 +103,9 @@ bool PartInWork::CloudSettled() const {
 bool PartInWork::Complete() const { return fusion.has_value() && CloudSettled(); }
 
 std::string PartInWork::Obstacle() const {
+  if (!stopped.empty()) {
+    return stopped;
+  }
   if (registration.has_value() && !converged()) {
     return registration->reason.empty()
                ? fmt::format("The registration ended with status {} and gave no reason.",
@@ -120,22 +125,18 @@ std::string PartInWork::Obstacle() const {
   return "";
 }
 
-std::int64_t PartInWork::EventUtime() const {
-  if (registration.has_value()) {
-    return registration->utime;
-  }
-  if (fusion.has_value()) {
-    return fusion->utime;
-  }
-  return scan.has_value() ? scan->utime : first_utime;
+bool PartInWork::Covers(std::int64_t utime) const {
+  const std::int64_t start_utime = scan.has_value()     ? scan->scan_start_utime
+                                   : fusion.has_value() ? fusion->scan_start_utime
+                                                        : first_utime;
+  return utime >= std::min(start_utime, first_utime) && utime <= EventUtime();
 }
 
 PartReport ReportOf(const PartInWork& work) {
   PartReport report;
   report.part = work.part;
   report.arrived_utime = work.arrived.has_value() ? work.arrived->utime : 0;
-  const bool seen = work.registration.has_value() || work.fusion.has_value() || work.scan.has_value();
-  report.last_view_utime = seen ? work.EventUtime() : 0;
+  report.last_view_utime = work.scan_end_utime.value_or(0);
   if (work.registration.has_value()) {
     report.registration = Reported(*work.registration, work.converged());
     report.reference_degc = work.registration->reference_degc;

@@ -1,6 +1,8 @@
 // [report] of the station file.
 #pragma once
 
+#include <cstdint>
+
 #include "services/common/config/config.h"
 #include "services/common/features/dimensions.h"
 #include "services/report/uncertainty.h"
@@ -23,6 +25,8 @@ struct ReportConfig {
   // Check().
   static Result<ReportConfig> Load(ConfigTable table);
   Status Check() const;
+  std::int64_t part_timeout_us() const { return static_cast<std::int64_t>(part_timeout_s * 1e6); }
+  std::int64_t loss_settle_us() const { return static_cast<std::int64_t>(loss_settle_s * 1e6); }
 };
 
 }  // namespace forgescan

@@ -51,10 +51,10 @@ void ReportPages::WriteWhenAllAreHeard(int part) {
 void ReportPages::Complete(JudgedPart& judged) {
   PartReport& report = judged.report;
   report.timing_s = WithSteps(report.timing_s, judged.work);
-  if (means_.tally.HeardSince(report.verdict_utime)) {
-    const ServiceSums now = means_.tally.Sums();
-    report.counters.messages_missing = now.messages_missing - judged.work.sums_at_opening.messages_missing;
-    report.counters.restarts = now.restarts - judged.work.sums_at_opening.restarts;
+  const std::optional<ServiceSums> now = means_.tally.Sums(), before = judged.work.sums_at_opening;
+  if (means_.tally.HeardSince(report.verdict_utime) && before.has_value() && now.has_value()) {
+    report.counters.messages_missing = now->messages_missing - before->messages_missing;
+    report.counters.restarts = now->restarts - before->restarts;
   }
   if (Result<std::vector<ReportedTrend>> trends = means_.writer.Trends(report); trends.ok()) {
     report.trends = std::move(*trends);

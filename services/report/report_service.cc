@@ -12,8 +12,8 @@ namespace {
 
 constexpr std::size_t kFinishedParts = 1000;  // a message later than that opens its part anew, and times out
 constexpr double kUsPerSecond = 1e6;
-
-std::int64_t Us(double seconds) { return static_cast<std::int64_t>(seconds * kUsPerSecond); }
+// A view that is being exposed when a scan is broken off is finished, and so is later than the scan's end.
+constexpr std::int64_t kAfterScanUs = 10'000'000;
 
 // "parts_ok", "parts_not_ok", ...
 std::string CounterName(Verdict verdict) {
@@ -43,7 +43,9 @@ ReportService::ReportService(StreamHub& hub, ServiceMonitor& monitor, Parts part
       station_(std::move(parts.station)),
       writer_(std::move(parts.writer)),
       evaluator_(evaluator),
-      pages_(hub.bus(), monitor, station_.name, {config_, writer_, evaluator_, tally_}) {
+      tally_(station_.services),
+      pages_(hub.bus(), monitor, station_.name, {config_, writer_, evaluator_, tally_}),
+      finished_(kFinishedParts) {
   Subscribe();
   SubscribeDurations();
   hub_.Advertise(kVerdict);
@@ -51,8 +53,10 @@ ReportService::ReportService(StreamHub& hub, ServiceMonitor& monitor, Parts part
 }
 
 ReportService::~ReportService() {
-  for (const auto& [part, open] : open_) {
-    hub_.bus().Cancel(open.timeout);
+  while (!open_.empty()) {
+    const auto first = open_.begin();
+    first->second.work.stopped = "The service was stopped before the part was judged.";
+    GiveVerdict(first->first);
   }
   hub_.bus().Cancel(loss_timer_);
 }
@@ -60,18 +64,18 @@ ReportService::~ReportService() {
 void ReportService::Subscribe() {
   hub_.Subscribe<fsmsg::part_arrived_t>(kPartArrived, [this](const auto& message) { OnArrived(message); });
   hub_.Subscribe<fsmsg::scan_complete_t>(kScanComplete, [this](const auto& message) {
-    if (PartInWork* work = Find(message.part, message.utime); work != nullptr) {
+    if (PartInWork* work = FindScan(message.part, message.utime); work != nullptr) {
       work->scan = message;
     }
   });
   hub_.Subscribe<fsmsg::fusion_result_t>(kFusionResult, [this](const auto& message) {
-    if (PartInWork* work = Find(message.part, message.utime); work != nullptr) {
+    if (PartInWork* work = FindScan(message.part, message.utime); work != nullptr) {
       work->fusion = message;
       FinishIfComplete(message.part);
     }
   });
   hub_.Subscribe<fsmsg::registration_t>(kRegistration, [this](const auto& message) {
-    if (PartInWork* work = Find(message.part, message.utime); work != nullptr) {
+    if (PartInWork* work = FindScan(message.part, message.utime); work != nullptr) {
       work->registration = message;
       work->registration_us = hub_.bus().NowUs();
       FinishIfComplete(message.part);
@@ -101,11 +105,13 @@ bool ReportService::EndEarlierPart(const fsmsg::part_arrived_t& arrived) {
   if (unfinished) {
     Finish(arrived.part);
   }
-  const auto erased = std::erase_if(finished_, [&](const FinishedPart& finished) {
-    return finished.part == arrived.part &&
-           (unfinished || finished.arrived || finished.utime < arrived.utime);
-  });
-  return erased > 0;
+  const FinishedPart* finished = finished_.Find(arrived.part);
+  const bool earlier =
+      finished != nullptr && (unfinished || finished->arrived || finished->utime < arrived.utime);
+  if (earlier) {
+    finished_.Take(arrived.part);
+  }
+  return earlier;
 }
 
 void ReportService::OnArrived(const fsmsg::part_arrived_t& message) {
@@ -119,7 +125,7 @@ void ReportService::OnArrived(const fsmsg::part_arrived_t& message) {
 }
 
 void ReportService::OnSlice(const fsmsg::cloud_slice_t& message) {
-  PartInWork* work = Find(message.part, message.utime);
+  PartInWork* work = FindScan(message.part, message.utime);
   if (work == nullptr) {
     return;
   }
@@ -134,11 +140,7 @@ void ReportService::OnSlice(const fsmsg::cloud_slice_t& message) {
 }
 
 void ReportService::OnDuration(const fsmsg::processing_time_t& message) {
-  const auto open = open_.find(message.part);
-  const bool of_open = open != open_.end() && message.utime >= open->second.work.ignore_before_utime;
-  PartInWork* judged = of_open ? nullptr : pages_.Find(message.part);
-  PartInWork* work = judged != nullptr ? judged : Find(message.part, message.utime);
-  if (work != nullptr) {
+  if (PartInWork* work = FindStep(message.part, message.utime); work != nullptr) {
     work->duration_us[message.step] += message.duration_us;
   }
 }
@@ -151,24 +153,6 @@ void ReportService::OnSorted(const fsmsg::part_sorted_t& message) {
   }
 }
 
-void ReportService::OnLoss(bool PartInWork::*hole) {
-  monitor_.Count("holes");
-  for (auto& [part, open] : open_) {
-    open.work.*hole = true;
-  }
-  CheckLossesLater();
-}
-
-void ReportService::CheckLossesLater() {
-  if (loss_timer_ != 0) {
-    return;  // further losses must not put the look off
-  }
-  loss_timer_ = hub_.bus().At(hub_.bus().NowUs() + Us(config_.loss_settle_s), [this] {
-    loss_timer_ = 0;
-    FinishWhatWaitsInVain();
-  });
-}
-
 PartInWork* ReportService::Find(int part, std::int64_t utime) {
   if (const auto open = open_.find(part); open != open_.end()) {
     PartInWork& work = open->second.work;
@@ -178,52 +162,61 @@ PartInWork* ReportService::Find(int part, std::int64_t utime) {
     work.first_utime = std::min(work.first_utime, utime);
     return &work;
   }
-  if (std::ranges::find(finished_, part, &FinishedPart::part) != finished_.end()) {
-    return nullptr;
+  return IsLate(part, utime) ? nullptr : &OpenPart(part, utime);
+}
+
+PartInWork* ReportService::FindScan(int part, std::int64_t end_utime) {
+  if (const auto open = open_.find(part); open != open_.end()) {
+    const std::optional<std::int64_t> known = open->second.work.scan_end_utime;
+    if (known.has_value() && end_utime < *known) {
+      return nullptr;
+    }
+    if (known.has_value() && end_utime > *known) {
+      Finish(part);  // another with its number came: nothing more will come of this one
+    }
   }
+  PartInWork* work = Find(part, end_utime);
+  if (work != nullptr) {
+    work->scan_end_utime = end_utime;
+  }
+  return work;
+}
+
+PartInWork* ReportService::FindStep(int part, std::int64_t utime) {
+  PartInWork* judged = pages_.Find(part);
+  if (judged != nullptr && judged->Covers(utime)) {
+    return judged;
+  }
+  const auto open = open_.find(part);
+  const bool late = open == open_.end() ? IsLate(part, utime - kAfterScanUs)
+                                        : utime > open->second.work.scan_end_utime.value_or(utime);
+  return late ? nullptr : Find(part, utime);
+}
+
+bool ReportService::IsLate(int part, std::int64_t utime) {
+  const FinishedPart* finished = finished_.Find(part);
+  return finished != nullptr && utime <= finished->last_utime;
+}
+
+PartInWork& ReportService::OpenPart(int part, std::int64_t utime) {
   Open& open = open_[part];
   open.work.part = part;
   open.work.first_utime = utime;
+  if (const FinishedPart* finished = finished_.Find(part); finished != nullptr) {
+    open.work.ignore_before_utime = finished->last_utime + 1;
+  }
   open.work.sums_at_opening = tally_.Sums();
-  open.timeout = hub_.bus().At(hub_.bus().NowUs() + Us(config_.part_timeout_s), [this, part] {
+  open.timeout = hub_.bus().At(hub_.bus().NowUs() + config_.part_timeout_us(), [this, part] {
     monitor_.Count("parts_timed_out");
     Finish(part);
   });
   TellState();
-  return &open.work;
+  return open.work;
 }
 
 void ReportService::FinishIfComplete(int part) {
   if (open_.at(part).work.Complete()) {
     Finish(part);
-  }
-}
-
-// Cloud and fusion's result are sent before the registration; a while after it they have been announced at
-// least.
-bool ReportService::WaitsInVain(const PartInWork& work) const {
-  if (!work.registration.has_value() ||
-      hub_.bus().NowUs() < work.registration_us + Us(config_.loss_settle_s)) {
-    return false;
-  }
-  const bool fusion_lost = work.fusion_hole && !hub_.Waiting(kFusionResult);
-  const bool cloud_lost = work.cloud_hole && !hub_.Waiting(kRegisteredCloud);
-  return (work.fusion.has_value() || fusion_lost) && (work.CloudSettled() || cloud_lost);
-}
-
-void ReportService::FinishWhatWaitsInVain() {
-  std::vector<int> in_vain;
-  bool others = false;
-  for (const auto& [part, open] : open_) {
-    if (WaitsInVain(open.work)) {
-      in_vain.push_back(part);
-    } else {
-      others = others || open.work.cloud_hole || open.work.fusion_hole;
-    }
-  }
-  std::for_each(in_vain.begin(), in_vain.end(), [this](int part) { Finish(part); });
-  if (others) {
-    CheckLossesLater();
   }
 }
 
@@ -247,6 +240,11 @@ PartReport ReportService::Judge(const PartInWork& work) const {
 }
 
 void ReportService::Finish(int part) {
+  GiveVerdict(part);
+  TellState();
+}
+
+void ReportService::GiveVerdict(int part) {
   const std::int64_t started_us = hub_.bus().NowUs();
   JudgedPart judged;
   judged.work = std::move(open_.at(part).work);
@@ -254,10 +252,9 @@ void ReportService::Finish(int part) {
   open_.erase(part);
   assembler_.Forget(part);
   const std::int64_t utime = judged.work.EventUtime();
-  finished_.push_back({part, utime, judged.work.arrived.has_value()});
-  if (finished_.size() > kFinishedParts) {
-    finished_.pop_front();
-  }
+  // Where the end of the scan is not known, it comes within the time that a part is waited for.
+  const std::int64_t last_utime = judged.work.scan_end_utime.value_or(utime + config_.part_timeout_us());
+  finished_.Insert(part, {utime, last_utime, judged.work.arrived.has_value()});
   judged.report = Judge(judged.work);
   PartReport& report = judged.report;
   report.verdict_utime = hub_.bus().NowUs();
@@ -268,7 +265,6 @@ void ReportService::Finish(int part) {
   judged.folder_name = ReportFolderName(part, utime);
   Publish(report, utime);
   pages_.Add(std::move(judged));
-  TellState();
 }
 
 // What goes wrong with files is told, but never keeps the verdict from the line.

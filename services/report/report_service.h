@@ -2,15 +2,16 @@
 // verdict, and keeps the report. Several parts may be in work at once. See README.md for channels and faults.
 #pragma once
 
-#include <deque>
 #include <map>
 #include <memory>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "fsmsg/part_sorted_t.hpp"
 #include "fsmsg/processing_time_t.hpp"
 #include "fsmsg/service_state_t.hpp"
+#include "services/common/aged_map.h"
 #include "services/common/bus/cloud_stream.h"
 #include "services/common/bus/stream_hub.h"
 #include "services/common/service/service_monitor.h"
@@ -29,6 +30,7 @@ struct ReportStation {
   std::string software_version;
   std::string config_hash;
   std::string results_folder;
+  std::vector<std::string> services;  // by name; a loss is known once each of them was heard
 };
 
 class ReportService {
@@ -40,7 +42,7 @@ class ReportService {
                                                        const PartEvaluator& evaluator);
   ReportService(const ReportService&) = delete;
   ReportService& operator=(const ReportService&) = delete;
-  // Writes the pages that are still due.
+  // Gives the parts in work their verdict, NOT_INSPECTED, and writes the pages that are still due.
   ~ReportService();
 
  private:
@@ -50,9 +52,9 @@ class ReportService {
   };
   // A part that has its verdict.
   struct FinishedPart {
-    int part = 0;
-    std::int64_t utime = 0;  // of its event
-    bool arrived = false;    // its arrival was seen
+    std::int64_t utime = 0;       // of its event
+    std::int64_t last_utime = 0;  // no event of it is later
+    bool arrived = false;         // its arrival was seen
   };
 
   // What the service works with; made by Create().
@@ -78,8 +80,16 @@ class ReportService {
   // The part in work, opened if it is new; nothing if it has its verdict already, or the message is of an
   // earlier part with the number.
   PartInWork* Find(int part, std::int64_t utime);
+  // The part in work whose scan ended then; one whose scan ended earlier gets its verdict. Nothing as above.
+  PartInWork* FindScan(int part, std::int64_t end_utime);
+  // The part in work, or with its page still due, that a step worked on; nothing as above.
+  PartInWork* FindStep(int part, std::int64_t utime);
+  // The event is of a part that has its verdict.
+  bool IsLate(int part, std::int64_t utime);
+  PartInWork& OpenPart(int part, std::int64_t utime);
   void FinishIfComplete(int part);
   void Finish(int part);
+  void GiveVerdict(int part);
   // What the part lacks was given up: its stream has a hole, and nothing is under way on it any more.
   bool WaitsInVain(const PartInWork& work) const;
   void FinishWhatWaitsInVain();
@@ -97,9 +107,9 @@ class ReportService {
   ServiceTally tally_;
   ReportPages pages_;  // after what it writes with
   CloudAssembler assembler_;
-  std::map<int, Open> open_;           // by part
-  std::deque<FinishedPart> finished_;  // the last ones, oldest first
-  Bus::TimerId loss_timer_ = 0;        // 0 = none set
+  std::map<int, Open> open_;             // by part
+  AgedMap<int, FinishedPart> finished_;  // the last ones, by part
+  Bus::TimerId loss_timer_ = 0;          // 0 = none set
 };
 
 }  // namespace forgescan

@@ -16,7 +16,10 @@ void ServiceTally::Note(const fsmsg::service_state_t& state, std::int64_t now_us
   service.stopping = state.state == fsmsg::service_state_t::STATE_STOPPING;
 }
 
-ServiceSums ServiceTally::Sums() const {
+std::optional<ServiceSums> ServiceTally::Sums() const {
+  if (!std::ranges::all_of(expected_, [this](const auto& name) { return services_.contains(name); })) {
+    return std::nullopt;
+  }
   ServiceSums sums;
   for (const auto& [name, service] : services_) {
     sums.restarts += static_cast<std::int64_t>(service.missing.size()) - 1;

@@ -4,7 +4,10 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "fsmsg/service_state_t.hpp"
 
@@ -18,11 +21,14 @@ struct ServiceSums {
 
 class ServiceTally {
  public:
+  // expected: names of the services that must have been heard before anything can be said of all.
+  explicit ServiceTally(std::vector<std::string> expected) : expected_(std::move(expected)) {}
   // now_us: when the state arrived, by the clock that HeardSince() is asked in. States may come late or
   // twice.
   void Note(const fsmsg::service_state_t& state, std::int64_t now_us);
 
-  ServiceSums Sums() const;
+  // Nothing until every expected service has been heard.
+  std::optional<ServiceSums> Sums() const;
   // Every service ever heard has been heard since then, or its last word was that it stops.
   bool HeardSince(std::int64_t since_us) const;
 
@@ -33,6 +39,7 @@ class ServiceTally {
     std::int64_t heard_us = 0;
     bool stopping = false;
   };
+  std::vector<std::string> expected_;
   std::map<std::string, Service> services_;  // by name
 };
 

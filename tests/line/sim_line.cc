@@ -115,10 +115,13 @@ Status SimLine::MakePartServices(const Station& station) {
   std::filesystem::remove_all(station.results, ignored);
   ASSIGN_OR_RETURN(const ReportConfig report, ReportConfig::Load(station.file.Table("report")));
   ASSIGN_OR_RETURN(evaluator_, ModelEvaluator::Load(station.model, station.features, report.dimensions));
-  ASSIGN_OR_RETURN(
-      report_service_,
-      ReportService::Create(At("report").hub, At("report").monitor, report,
-                            {station.name, "0", station.file.hash(), station.results}, *evaluator_));
+  ASSIGN_OR_RETURN(report_service_, ReportService::Create(At("report").hub, At("report").monitor, report,
+                                                          {station.name,
+                                                           "0",
+                                                           station.file.hash(),
+                                                           station.results,
+                                                           {kServiceNames.begin(), kServiceNames.end()}},
+                                                          *evaluator_));
   return {};
 }
 

@@ -1,11 +1,17 @@
 // A station's folder: station.toml and the files it names. Every service of a station reads the same one.
 #pragma once
 
+#include <array>
 #include <string>
 
 #include "services/common/config/config.h"
 
 namespace forgescan {
+
+// The services of every station, by the names in their SERVICE_STATE.
+inline constexpr std::array<const char*, 9> kServiceNames = {"report",         "registration", "fusion",
+                                                             "reconstruction", "camera_left",  "camera_right",
+                                                             "cooling",        "trigger",      "robot"};
 
 struct Station {
   std::string folder;  // where station.toml is; relative paths in it start here

@@ -2,6 +2,7 @@
 // result.
 #pragma once
 
+#include <cstdint>
 #include <string>
 
 #include "fsmsg/processing_time_t.hpp"
@@ -13,8 +14,10 @@ class StepTimer {
  public:
   // Begins now. `view`: index, or kAllViews (-1).
   StepTimer(StreamHub& hub, std::string step, int part, int view);
-  // Publishes the time since the beginning; a refusal is reported to the monitor.
-  void Finish(const Channel<fsmsg::processing_time_t>& channel, ServiceMonitor& monitor) const;
+  // Publishes the time since the beginning; a refusal is reported to the monitor. utime: of the result of the
+  // step, which tells the part from others with its number.
+  void Finish(const Channel<fsmsg::processing_time_t>& channel, ServiceMonitor& monitor,
+              std::int64_t utime) const;
 
  private:
   StreamHub& hub_;

@@ -102,6 +102,7 @@ TEST_F(FinishedPartsTest, LateMessagesMakeNoSecondPart) {
   Start();
   Part(1);
   ASSERT_EQ(results_.size(), 1U);
+  step_us_ = -2 * kSecondUs;  // of the scan that has its result
   View(1);
   End(1);
   network_.RunFor(200 * kSecondUs);  // longer than the timeout of a part
@@ -116,6 +117,53 @@ TEST_F(FinishedPartsTest, TheSameNumberThatArrivesAgainIsAnotherPart) {
     ASSERT_EQ(results_.size(), i);
     EXPECT_EQ(results_.back().status, fsmsg::view_result_t::STATUS_OK);
   }
+}
+
+TEST_F(FinishedPartsTest, APartWhoseArrivalWasLostAfterAFinishedOneHasItsResult) {
+  Start();
+  Part(1);
+  network_.RunFor(45 * kSecondUs);
+  View(1);
+  End(1);
+  network_.RunFor(70 * kSecondUs);  // longer than the timeout of a view
+  ASSERT_EQ(results_.size(), 2U);
+  EXPECT_EQ(results_[1].status, fsmsg::view_result_t::STATUS_VOID);
+  EXPECT_THAT(results_[1].reason, HasSubstr("arrival was not seen"));
+  EXPECT_NE(results_[1].utime, results_[0].utime);
+}
+
+TEST_F(FinishedPartsTest, ViewsOfTwoPartsAreNotJoinedWhenTheArrivalBetweenThemWasLost) {
+  Start();
+  Arrive(1);
+  End(1);  // and its view is late
+  network_.RunFor(45 * kSecondUs);
+  View(1);
+  End(1);
+  network_.RunFor(70 * kSecondUs);
+  ASSERT_EQ(results_.size(), 1U);
+  EXPECT_EQ(results_[0].status, fsmsg::view_result_t::STATUS_VOID);
+  EXPECT_THAT(monitor_.last_error(), HasSubstr("arrival was not seen"));
+}
+
+// Of a scan that was broken off while the view was exposed.
+TEST_F(FinishedPartsTest, AViewThatEndsSoonAfterItsScanBeginsNoPart) {
+  Start();
+  Part(1);
+  ASSERT_EQ(results_.size(), 1U);
+  step_us_ = kSecondUs / 2;
+  View(1);
+  EXPECT_EQ(monitor_.counter("messages_late"), 3);
+}
+
+TEST_F(FinishedPartsTest, TheDurationCarriesTheTimeOfItsResult) {
+  std::vector<fsmsg::processing_time_t> times;
+  listener_.Subscribe<fsmsg::processing_time_t>(kFusionTime,
+                                                [&times](const auto& time) { times.push_back(time); });
+  Start();
+  Part(1);
+  ASSERT_EQ(results_.size(), 1U);
+  ASSERT_EQ(times.size(), 1U);
+  EXPECT_EQ(times[0].utime, results_[0].utime);
 }
 
 TEST_F(FinishedPartsTest, AClockSetBackMakesNoDifferenceToThat) {

@@ -30,6 +30,13 @@ class FinishedViewsTest : public ::testing::Test {
                                               [this](const auto& result) { results_.push_back(result); });
     network_.RunFor(kSecondUs);
   }
+  void Arrive(int part, std::int64_t utime) {
+    fsmsg::part_arrived_t arrived{};
+    arrived.utime = utime;
+    arrived.part = part;
+    ASSERT_TRUE(sender_.Publish(kPartArrived, arrived).ok());
+    network_.RunFor(kSecondUs / 10);
+  }
   void Captured(int part, int fired = kFrames) {
     fsmsg::view_captured_t captured{};
     captured.utime = network_.NowUs();
@@ -99,6 +106,79 @@ TEST_F(FinishedViewsTest, TheSameNumbersMuchLaterAreAnotherPart) {
     EXPECT_EQ(results_.size(), i);
     network_.RunFor(60 * kSecondUs);
   }
+}
+
+TEST_F(FinishedViewsTest, TheSameNumbersSoonAreAnotherPartOnceItHasArrived) {
+  for (std::size_t i = 1; i <= 3; ++i) {
+    Arrive(1, network_.NowUs());
+    Captured(1);
+    Manifest(1, kLeft, 1);
+    EXPECT_EQ(results_.size(), i);
+    network_.RunFor(5 * kSecondUs);
+  }
+  EXPECT_EQ(monitor_.counter("messages_late"), 0);
+}
+
+TEST_F(FinishedViewsTest, AnUnfinishedViewLeavesNoFramesToTheNextPart) {
+  Arrive(1, network_.NowUs());
+  Frame(1, 0);
+  Frame(1, 1);
+  network_.RunFor(5 * kSecondUs);
+  Arrive(1, network_.NowUs());
+  Frame(1, 2);
+  Manifest(1, kLeft, 1);
+  ASSERT_EQ(results_.size(), 1U);
+  EXPECT_EQ(results_[0].frames_used, 1);
+}
+
+TEST_F(FinishedViewsTest, NorOnAClockSetBackNorWithoutAnArrival) {
+  Arrive(1, network_.NowUs() + 3600 * kSecondUs);  // by a clock that is set back afterwards
+  Captured(1);
+  EXPECT_EQ(monitor_.counter("messages_late"), 1);
+  Arrive(1, network_.NowUs());
+  Frame(1, 0);
+  network_.RunFor(60 * kSecondUs);
+  Frame(1, 1);
+  Manifest(1, kLeft, 1);
+  ASSERT_EQ(results_.size(), 1U);
+  EXPECT_EQ(results_[0].frames_used, 1);
+}
+
+TEST_F(FinishedViewsTest, AnArrivalThatComesLateIsStillThePartsOwn) {
+  const std::int64_t arrival_utime = network_.NowUs();
+  network_.RunFor(kSecondUs);
+  Frame(1, 0);
+  Arrive(1, arrival_utime);
+  Manifest(1, kLeft, 1);
+  ASSERT_EQ(results_.size(), 1U);
+  EXPECT_EQ(results_[0].frames_used, 1);
+  Captured(1);
+  EXPECT_EQ(results_.size(), 1U);
+  EXPECT_EQ(monitor_.counter("messages_late"), 1);
+}
+
+TEST_F(FinishedViewsTest, TheTimeoutOfAnEarlierPartIsNotTheNextOnes) {
+  Captured(1);
+  network_.RunFor(20 * kSecondUs);
+  Arrive(1, network_.NowUs());
+  Captured(1);
+  network_.RunFor(20 * kSecondUs);  // the timeout is 30 s
+  EXPECT_TRUE(results_.empty());
+  network_.RunFor(20 * kSecondUs);
+  EXPECT_EQ(results_.size(), 1U);
+}
+
+TEST_F(FinishedViewsTest, AViewWithoutAFrameHasATimeAllTheSame) {
+  std::vector<fsmsg::processing_time_t> times;
+  listener_.Subscribe<fsmsg::processing_time_t>(kReconstructionTime,
+                                                [&times](const auto& time) { times.push_back(time); });
+  network_.RunFor(kSecondUs);
+  const std::int64_t captured_utime = network_.NowUs();
+  Captured(1, 7);
+  ASSERT_EQ(results_.size(), 1U);
+  EXPECT_EQ(results_[0].utime, captured_utime);
+  ASSERT_EQ(times.size(), 1U);
+  EXPECT_EQ(times[0].utime, captured_utime);
 }
 
 TEST_F(FinishedViewsTest, AnotherNumberOfPatternsThanInTheFileIsNamedWithBoth) {

@@ -51,6 +51,9 @@ class ReconstructionServiceTest : public ::testing::Test {
   }
 
   static int FrameCount() { return SmallPattern(Background::kShared).frame_count(); }
+  static std::int64_t LastPulseUtime() {
+    return kFirstPulseUtime + kPulsePeriodUs * (FrameCount() - 1) + kPulsePeriodUs / 2;
+  }
 
   void Frame(int part, int view, std::int8_t camera, int pattern, const StereoFrames& images) {
     const cv::Mat& image = (camera == kLeft ? images.left : images.right)[static_cast<std::size_t>(pattern)];
@@ -68,6 +71,7 @@ class ReconstructionServiceTest : public ::testing::Test {
   }
   void Manifest(int part, int view, std::int8_t camera, int missing = 0, const std::string& reason = "") {
     fsmsg::view_frames_t manifest{};
+    manifest.utime = LastPulseUtime();
     manifest.part = part;
     manifest.view = view;
     manifest.camera = camera;
@@ -79,6 +83,7 @@ class ReconstructionServiceTest : public ::testing::Test {
   }
   void Captured(int part, int view, const std::string& reason = "") {
     fsmsg::view_captured_t captured{};
+    captured.utime = LastPulseUtime();
     captured.part = part;
     captured.view = view;
     captured.status =
@@ -136,7 +141,7 @@ TEST_F(ReconstructionServiceTest, AWholeViewGivesWhatTheAlgorithmGives) {
   EXPECT_EQ(result.frames_expected, 2 * FrameCount());
   EXPECT_EQ(result.frames_used, 2 * FrameCount());
   // The middle between the first pulse of the left and the last of the right camera.
-  EXPECT_EQ(result.utime, kFirstPulseUtime + (kPulsePeriodUs * (FrameCount() - 1) + kPulsePeriodUs / 2) / 2);
+  EXPECT_EQ(result.utime, kFirstPulseUtime + (LastPulseUtime() - kFirstPulseUtime) / 2);
   const CameraQuality& left = expected->quality.left;
   EXPECT_EQ(result.pixels_valid, left.pixels[static_cast<std::size_t>(MaskCause::kValid)]);
   EXPECT_EQ(result.mask_saturated, left.pixels[static_cast<std::size_t>(MaskCause::kSaturated)]);

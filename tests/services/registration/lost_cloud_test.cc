@@ -121,6 +121,44 @@ TEST_F(LostCloudTest, GivingUpTheEarlierPartLeavesTheLaterItsSlices) {
   EXPECT_THAT(results_[1].reason, ::testing::Not(HasSubstr("not whole")));
 }
 
+TEST_F(LostCloudTest, APartThatIsDoneTakesNoHoleFromOneThatWaits) {
+  const auto doomed = std::make_unique<StreamHub>(network_.AddNode(), "fusion",
+                                                  StreamOptions{.history_bytes = 1});  // keeps one message
+  doomed->Advertise(kFusedCloud);
+  Fused(1, kFirst);
+  network_.RunFor(kSecondUs);
+  network_.SetFaults({.loss = 1.0, .large_loss = 1.0});
+  ASSERT_TRUE(doomed->Publish(kFusedCloud, TwoSlices(1, kFirst)[0]).ok());
+  network_.SetFaults({});
+  ASSERT_TRUE(doomed->Publish(kFusedCloud, TwoSlices(1, kFirst)[1]).ok());
+  network_.RunFor(3 * kSecondUs);
+  EXPECT_THAT(monitor_.last_error(), HasSubstr("are lost"));
+  Slices(2, 2, kSecond);
+  Fused(2, kSecond);
+  network_.RunFor(5 * kSecondUs);
+  ASSERT_EQ(results_.size(), 1U);
+  EXPECT_EQ(results_[0].part, 2);
+  Fused(3, kSecond);                // after the hole
+  network_.RunFor(20 * kSecondUs);  // longer than the timeouts of parts 1 and 3
+  ASSERT_EQ(results_.size(), 3U);
+  EXPECT_EQ(results_[1].part, 1);
+  EXPECT_THAT(results_[1].reason, HasSubstr("slices 1 to 1 of the fused clouds are lost"));
+  EXPECT_EQ(results_[2].part, 3);
+  EXPECT_THAT(results_[2].reason, ::testing::Not(HasSubstr("are lost")));
+}
+
+TEST_F(LostCloudTest, TheDurationCarriesTheTimeOfItsResult) {
+  std::vector<fsmsg::processing_time_t> times;
+  listener_.Subscribe<fsmsg::processing_time_t>(kRegistrationTime,
+                                                [&times](const auto& time) { times.push_back(time); });
+  network_.RunFor(kSecondUs);
+  Slices(1, 2, kFirst);
+  Fused(1, kFirst);
+  network_.RunFor(kSecondUs);
+  ASSERT_EQ(times.size(), 1U);
+  EXPECT_EQ(times[0].utime, kFirst);
+}
+
 TEST(RegistrationConfigRange, AStartBeyondWhatTheRegistrationAllowsIsRefusedByItsKey) {
   const auto file = ConfigFile::Parse("[registration]\nstart_rotation_rad = 0.6\n", "station.toml");
   ASSERT_TRUE(file.ok());

@@ -8,6 +8,7 @@ namespace {
 
 class ReportCountersTest : public ReportServiceTest {
  protected:
+  using ReportServiceTest::ReportServiceTest;
   void Say(const char* name, std::int64_t session, std::int64_t missing,
            std::int8_t state = fsmsg::service_state_t::STATE_READY) {
     fsmsg::service_state_t message{};
@@ -94,8 +95,40 @@ TEST_F(ReportCountersTest, FramesAreNotKnownWithoutTheFusionsWord) {
   EXPECT_EQ(Counters()["messages_missing"], 0);
 }
 
+// A station with a camera beside the report, which hears itself.
+class ReportCountersOfTwoTest : public ReportCountersTest {
+ protected:
+  ReportCountersOfTwoTest() : ReportCountersTest({"report", "camera_left"}) {}
+};
+
+TEST_F(ReportCountersOfTwoTest, NothingIsKnownOfAServiceThatWasNeverHeard) {
+  Judge(1);
+  network_.RunFor(10 * kSecondUs);
+  EXPECT_TRUE(Counters()["messages_missing"].is_null());
+  EXPECT_TRUE(Counters()["restarts"].is_null());
+}
+
+TEST_F(ReportCountersOfTwoTest, NorOfWhatItLostBeforeItsFirstWord) {
+  Arrive(1);
+  network_.RunFor(kSecondUs);
+  Say("camera_left", 1, 3);
+  Judge(1);
+  network_.RunFor(kSecondUs);
+  Say("camera_left", 1, 3);
+  network_.RunFor(2 * kSecondUs);
+  EXPECT_TRUE(Counters()["messages_missing"].is_null());
+
+  Judge(2);
+  network_.RunFor(kSecondUs);
+  Say("camera_left", 1, 3);
+  network_.RunFor(2 * kSecondUs);
+  EXPECT_EQ(Counters()["messages_missing"], 0) << "the next part has heard it from the beginning";
+  EXPECT_EQ(Counters()["restarts"], 0);
+}
+
 TEST(ServiceTally, AStateThatComesLateTakesNothingBack) {
-  ServiceTally tally;
+  ServiceTally tally({"camera_left"});
+  EXPECT_FALSE(tally.Sums().has_value());
   fsmsg::service_state_t state{};
   state.name = "camera_left";
   state.session = 2;
@@ -103,7 +136,7 @@ TEST(ServiceTally, AStateThatComesLateTakesNothingBack) {
     state.messages_missing = missing;
     tally.Note(state, 10);
   }
-  EXPECT_EQ(tally.Sums().messages_missing, 3);
+  EXPECT_EQ(tally.Sums()->messages_missing, 3);
   EXPECT_TRUE(tally.HeardSince(10));
   EXPECT_FALSE(tally.HeardSince(11));
 }

@@ -83,11 +83,12 @@ inline fsmsg::fusion_result_t Fusion(int part) {
 
 class ReportServiceTest : public ::testing::Test {
  protected:
-  ReportServiceTest() {
+  // services: of the station.
+  explicit ReportServiceTest(const std::vector<std::string>& services = {"report"}) {
     std::filesystem::remove_all(folder_);
     listener_.Subscribe<fsmsg::verdict_t>(kVerdict,
                                           [this](const auto& verdict) { verdicts_.push_back(verdict); });
-    Start();
+    Start(services);
     network_.RunFor(kSecondUs);
   }
   ~ReportServiceTest() override {
@@ -95,9 +96,9 @@ class ReportServiceTest : public ::testing::Test {
     std::filesystem::remove_all(folder_);
   }
 
-  void Start() {
+  void Start(const std::vector<std::string>& services) {
     config_.picture_width_px = 400;
-    const ReportStation station{"test <station>", "0.1.0", "01234567", folder_.string()};
+    const ReportStation station{"test <station>", "0.1.0", "01234567", folder_.string(), services};
     auto service = ReportService::Create(hub_, monitor_, config_, station, evaluator_);
     ASSERT_TRUE(service.ok()) << service.error().message;
     service_ = *service;
@@ -126,10 +127,11 @@ class ReportServiceTest : public ::testing::Test {
     SendCloud(part);
     SendRegistration(part, fsmsg::registration_t::STATUS_CONVERGED);
   }
+  // offset_us: of what the step worked on, against the end of the scan.
   void SendDuration(const Channel<fsmsg::processing_time_t>& channel, const char* step, int part,
-                    std::int64_t us) {
+                    std::int64_t us, std::int64_t offset_us = 0) {
     fsmsg::processing_time_t message{};
-    message.utime = Fusion(part).utime;
+    message.utime = Fusion(part).utime + offset_us;
     message.part = part;
     message.step = step;
     message.duration_us = us;

@@ -168,6 +168,23 @@ TEST_F(ReportServiceTest, ARestartKeepsTheHistoryAndWritesThePagesThatAreDue) {
   EXPECT_EQ(history->LastValues("total length", 25)->size(), 1u);
 }
 
+TEST_F(ReportServiceTest, APartInWorkIsNotInspectedWhenTheServiceStops) {
+  Arrive(1);
+  SendCloud(1);
+  SendRegistration(1, fsmsg::registration_t::STATUS_CONVERGED);
+  network_.RunFor(kSecondUs);
+  EXPECT_TRUE(verdicts_.empty());
+  monitor_.SetState(ServiceState::kStopping, "stopping");
+  network_.RunFor(1000);
+  service_.reset();
+  ASSERT_TRUE(network_.RunUntilTrue([this] { return !verdicts_.empty(); }, 1000));
+  EXPECT_EQ(verdicts_[0].verdict, fsmsg::verdict_t::VERDICT_NOT_INSPECTED);
+  EXPECT_EQ(verdicts_[0].reason, "The service was stopped before the part was judged.");
+  EXPECT_EQ(ReadJson(verdicts_[0])["verdict"], "NOT_INSPECTED");
+  EXPECT_TRUE(std::filesystem::exists(folder_ / verdicts_[0].report_folder / "report.html"));
+  EXPECT_EQ(monitor_.state(), ServiceState::kStopping);
+}
+
 TEST(ReportConfig, RefusesWhatIsWrong) {
   const auto load = [](const char* text) {
     const Result<ConfigFile> file = ConfigFile::Parse(text, "station.toml");

@@ -15,6 +15,8 @@
 #include <random>
 
 #include "services/common/geometry/cloud_io.h"
+#include "services/common/service/station.h"
+#include "tools/forgescan/station/station_services.h"
 
 namespace forgescan {
 namespace {
@@ -303,6 +305,14 @@ TEST_F(Cli, AResultThatStandardOutputCannotTakeIsAnError) {
     std::getline(error, sentence);
     EXPECT_EQ(sentence, "forgescan: standard output cannot be written") << call;
   }
+}
+
+TEST(StationServices, AreThoseThatTheReportWaitsFor) {
+  std::vector<std::string> started;
+  for (const StationService& service : StationServices()) {
+    started.push_back(service.name);
+  }
+  EXPECT_EQ(started, std::vector<std::string>(kServiceNames.begin(), kServiceNames.end()));
 }
 
 }  // namespace
