@@ -64,11 +64,13 @@ ReportService::~ReportService() {
 void ReportService::Subscribe() {
   hub_.Subscribe<fsmsg::part_arrived_t>(kPartArrived, [this](const auto& message) { OnArrived(message); });
   hub_.Subscribe<fsmsg::scan_complete_t>(kScanComplete, [this](const auto& message) {
+    NoteScan(message.part, message.scan_start_utime, message.utime);
     if (PartInWork* work = FindScan(message.part, message.utime); work != nullptr) {
       work->scan = message;
     }
   });
   hub_.Subscribe<fsmsg::fusion_result_t>(kFusionResult, [this](const auto& message) {
+    NoteScan(message.part, message.scan_start_utime, message.utime);
     if (PartInWork* work = FindScan(message.part, message.utime); work != nullptr) {
       work->fusion = message;
       FinishIfComplete(message.part);
@@ -107,7 +109,7 @@ bool ReportService::EndEarlierPart(const fsmsg::part_arrived_t& arrived) {
   }
   const FinishedPart* finished = finished_.Find(arrived.part);
   const bool earlier =
-      finished != nullptr && (unfinished || finished->arrived || finished->utime < arrived.utime);
+      finished != nullptr && (unfinished || finished->arrived.has_value() || finished->utime < arrived.utime);
   if (earlier) {
     finished_.Take(arrived.part);
   }
@@ -166,14 +168,14 @@ PartInWork* ReportService::Find(int part, std::int64_t utime) {
 }
 
 PartInWork* ReportService::FindScan(int part, std::int64_t end_utime) {
-  if (const auto open = open_.find(part); open != open_.end()) {
-    const std::optional<std::int64_t> known = open->second.work.scan_end_utime;
-    if (known.has_value() && end_utime < *known) {
-      return nullptr;
-    }
-    if (known.has_value() && end_utime > *known) {
-      Finish(part);  // another with its number came: nothing more will come of this one
-    }
+  const auto open = open_.find(part);
+  const std::int64_t known_utime =
+      open == open_.end() ? end_utime : open->second.work.scan_end_utime.value_or(end_utime);
+  if (end_utime < known_utime) {
+    return nullptr;
+  }
+  if (end_utime > known_utime) {
+    Finish(part);  // another with its number came: nothing more will come of this one
   }
   PartInWork* work = Find(part, end_utime);
   if (work != nullptr) {
@@ -191,6 +193,13 @@ PartInWork* ReportService::FindStep(int part, std::int64_t utime) {
   const bool late = open == open_.end() ? IsLate(part, utime - kAfterScanUs)
                                         : utime > open->second.work.scan_end_utime.value_or(utime);
   return late ? nullptr : Find(part, utime);
+}
+
+void ReportService::NoteScan(int part, std::int64_t start_utime, std::int64_t end_utime) {
+  FinishedPart* finished = finished_.Find(part);
+  if (finished != nullptr && finished->arrived.has_value() && finished->arrived->utime == start_utime) {
+    finished->last_utime = std::max(finished->last_utime, end_utime);
+  }
 }
 
 bool ReportService::IsLate(int part, std::int64_t utime) {
@@ -254,7 +263,7 @@ void ReportService::GiveVerdict(int part) {
   const std::int64_t utime = judged.work.EventUtime();
   // Where the end of the scan is not known, it comes within the time that a part is waited for.
   const std::int64_t last_utime = judged.work.scan_end_utime.value_or(utime + config_.part_timeout_us());
-  finished_.Insert(part, {utime, last_utime, judged.work.arrived.has_value()});
+  finished_.Insert(part, {utime, last_utime, judged.work.arrived});
   judged.report = Judge(judged.work);
   PartReport& report = judged.report;
   report.verdict_utime = hub_.bus().NowUs();

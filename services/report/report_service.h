@@ -54,7 +54,7 @@ class ReportService {
   struct FinishedPart {
     std::int64_t utime = 0;       // of its event
     std::int64_t last_utime = 0;  // no event of it is later
-    bool arrived = false;         // its arrival was seen
+    std::optional<fsmsg::part_arrived_t> arrived;
   };
 
   // What the service works with; made by Create().
@@ -84,6 +84,8 @@ class ReportService {
   PartInWork* FindScan(int part, std::int64_t end_utime);
   // The part in work, or with its page still due, that a step worked on; nothing as above.
   PartInWork* FindStep(int part, std::int64_t utime);
+  // A part that has its verdict was in place from then to then: nothing of it is later, however long it was.
+  void NoteScan(int part, std::int64_t start_utime, std::int64_t end_utime);
   // The event is of a part that has its verdict.
   bool IsLate(int part, std::int64_t utime);
   PartInWork& OpenPart(int part, std::int64_t utime);

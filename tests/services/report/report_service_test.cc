@@ -85,6 +85,22 @@ TEST_F(ReportServiceTest, WhatComesTooLateChangesNothing) {
   EXPECT_EQ(verdicts_.size(), 1u);
 }
 
+TEST_F(ReportServiceTest, NorDoesTheEndOfAScanThatTookLongerThanThePartsTime) {
+  Arrive(5);
+  network_.RunFor(static_cast<std::int64_t>(config_.part_timeout_s + 2.0) * kSecondUs);
+  fsmsg::scan_complete_t scan{};
+  scan.scan_start_utime = Fusion(5).scan_start_utime;
+  scan.utime = scan.scan_start_utime + static_cast<std::int64_t>(config_.part_timeout_s + 10.0) * kSecondUs;
+  scan.part = 5;
+  ASSERT_TRUE(line_.Publish(kScanComplete, scan).ok());
+  network_.RunFor(kSecondUs);
+  fsmsg::registration_t registration = Registration(5, fsmsg::registration_t::STATUS_FAILED);
+  registration.utime = scan.utime;
+  ASSERT_TRUE(line_.Publish(kRegistration, registration).ok());
+  network_.RunFor(2 * static_cast<std::int64_t>(config_.part_timeout_s) * kSecondUs);
+  EXPECT_EQ(verdicts_.size(), 1u);
+}
+
 TEST_F(ReportServiceTest, TwoPartsInterleaved) {
   Arrive(7);
   Arrive(8);
