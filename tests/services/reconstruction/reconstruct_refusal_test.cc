@@ -84,8 +84,9 @@ TEST(ReconstructRefusal, RefusesACalibrationThatCannotBelongToTheFrames) {
               HasSubstr("the principal point of the left camera is at x = 322.6 px"));
   EXPECT_THAT(refusal([](StereoCalibration& rig) { rig.right.camera_matrix(1, 2) = 20; }),
               HasSubstr("the principal point of the right camera is at y = 20.0 px"));
-  EXPECT_THAT(refusal([](StereoCalibration& rig) { rig.right.camera_matrix(0, 0) = 50; }),
-              HasSubstr("the right camera would see 145.3 degrees"));
+  EXPECT_THAT(
+      refusal([](StereoCalibration& rig) { rig.right.camera_matrix.diagonal().head(2).setConstant(50); }),
+      HasSubstr("the right camera would see 145.3 degrees"));
   EXPECT_THAT(refusal([](StereoCalibration& rig) { rig.left.camera_matrix.diagonal().head(2) *= 1.2; }),
               HasSubstr("between 602.0 and 720.0 px"));
   EXPECT_THAT(refusal([](StereoCalibration& rig) { rig.left.distortion[0] = 100; }),

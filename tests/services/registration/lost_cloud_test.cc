@@ -122,8 +122,9 @@ TEST_F(LostCloudTest, GivingUpTheEarlierPartLeavesTheLaterItsSlices) {
 }
 
 TEST_F(LostCloudTest, APartThatIsDoneTakesNoHoleFromOneThatWaits) {
-  const auto doomed = std::make_unique<StreamHub>(network_.AddNode(), "fusion",
-                                                  StreamOptions{.history_bytes = 1});  // keeps one message
+  const auto doomed =
+      std::make_unique<StreamHub>(network_.AddNode(), "fusion",
+                                  StreamOptions{.history_bytes = 1, .burst_bytes = 1});  // keeps one message
   doomed->Advertise(kFusedCloud);
   Fused(1, kFirst);
   network_.RunFor(kSecondUs);
