@@ -41,10 +41,11 @@ std::map<std::string, Row> RowsOfReadme() {
 
 std::map<std::string, Row> ChannelsOfCode() {
   const std::string text = ReadAll(kSource / "services/common/bus/channels.h");
-  const std::regex channel(R"(constexpr (State)?Channel<fsmsg::(\w+)> \w+\{\"(\w+)\"\})");
+  const std::regex channel(R"(constexpr (State|Log)?Channel<fsmsg::(\w+)> \w+\{\"(\w+)\"\})");
   std::map<std::string, Row> channels;
   for (std::sregex_iterator match(text.begin(), text.end(), channel), end; match != end; ++match) {
-    channels[(*match)[3]] = {(*match)[2], (*match)[1].matched ? "state" : "stream"};
+    const std::string prefix = (*match)[1];
+    channels[(*match)[3]] = {(*match)[2], prefix == "State" ? "state" : prefix == "Log" ? "log" : "stream"};
   }
   return channels;
 }

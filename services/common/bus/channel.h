@@ -15,4 +15,10 @@ struct StateChannel {
   const char* name;
 };
 
+// Never on the bus: what the recorder adds to its files.
+template <typename Message>
+struct LogChannel {
+  const char* name;
+};
+
 }  // namespace forgescan

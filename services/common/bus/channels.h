@@ -12,6 +12,10 @@
 #include "fsmsg/part_temperature_t.hpp"
 #include "fsmsg/path_state_t.hpp"
 #include "fsmsg/processing_time_t.hpp"
+#include "fsmsg/recorded_file_t.hpp"
+#include "fsmsg/recorder_state_t.hpp"
+#include "fsmsg/recording_closed_t.hpp"
+#include "fsmsg/recording_opened_t.hpp"
 #include "fsmsg/registration_t.hpp"
 #include "fsmsg/scan_complete_t.hpp"
 #include "fsmsg/service_state_t.hpp"
@@ -50,6 +54,11 @@ inline constexpr Channel<fsmsg::processing_time_t> kRegistrationTime{"REGISTRATI
 
 inline constexpr StateChannel<fsmsg::path_state_t> kPathState{"PATH_STATE"};
 inline constexpr StateChannel<fsmsg::cooling_state_t> kCoolingState{"COOLING_STATE"};
+inline constexpr StateChannel<fsmsg::recorder_state_t> kRecorderState{"RECORDER_STATE"};
 inline constexpr StateChannel<fsmsg::service_state_t> kServiceState{"SERVICE_STATE"};
+
+inline constexpr LogChannel<fsmsg::recording_opened_t> kRecordingOpened{"RECORDING_OPENED"};
+inline constexpr LogChannel<fsmsg::recorded_file_t> kRecordedFile{"RECORDED_FILE"};
+inline constexpr LogChannel<fsmsg::recording_closed_t> kRecordingClosed{"RECORDING_CLOSED"};
 
 }  // namespace forgescan
