@@ -14,7 +14,7 @@ namespace {
 using testing::HasSubstr;
 
 std::string Read(const std::string& path) {
-  std::ifstream file(std::string(FORGESCAN_SOURCE_DIR) + "/" + path, std::ios::binary);
+  std::ifstream file(std::string(FORGESCAN_SOURCE_DIR "/") + path, std::ios::binary);
   std::ostringstream text;
   text << file.rdbuf();
   return text.str();
