@@ -22,6 +22,11 @@ void SimNetwork::RemoveNode(SimBus& node) {
   std::erase_if(nodes_, [&node](const auto& held) { return held.get() == &node; });
 }
 
+bool SimNetwork::IsHeard(std::string_view channel) const {
+  return std::any_of(nodes_.begin(), nodes_.end(),
+                     [channel](const auto& node) { return node->handlers_.contains(channel); });
+}
+
 void SimNetwork::Send(const std::string& channel, ByteView message) {
   const auto shared = std::make_shared<const Bytes>(message.begin(), message.end());
   const double loss = message.size() > kDatagramBytes ? faults_.large_loss : faults_.loss;

@@ -32,6 +32,8 @@ class SimNetwork final : public Clock {
   SimBus& AddNode();
   void RemoveNode(SimBus& node);
 
+  // True if a node has subscribed to the channel.
+  bool IsHeard(std::string_view channel) const;
   void SetFaults(const SimFaults& faults) { faults_ = faults; }
   std::int64_t NowUs() const override { return now_us_; }
   // Runs everything due until then; the time is `until_us` afterwards.

@@ -38,6 +38,12 @@ class StreamHub {
   Status Publish(const Channel<Message>& channel, const Message& message) {
     return sender_.Publish(channel.name, Encode(message));
   }
+  // The same for a message whose type only its receivers know (play). Errors: kInvalidArgument (too large, or
+  // too short for a stream's header).
+  void AdvertiseChannel(const std::string& channel) { sender_.Advertise(channel); }
+  Status PublishBytes(const std::string& channel, Bytes message) {
+    return sender_.Publish(channel, std::move(message));
+  }
   // Every message once, in order. What does not decode is counted, never delivered.
   template <typename Message>
   void Subscribe(const Channel<Message>& channel, std::function<void(const Message&)> handler) {

@@ -49,8 +49,8 @@ class LogReader {
   const std::vector<LogDamage>& damage() const { return damage_; }   // in file order; empty = whole
   const std::vector<std::string>& channels() const { return channels_; }
   const std::string& ChannelOf(const LogEntry& entry) const { return channels_[entry.channel]; }
-  // The message. Errors: kIo (the file has changed or cannot be read).
-  Result<Bytes> Read(const LogEntry& entry) const;
+  // The message, or at most its first bytes. Errors: kIo (the file has changed or cannot be read).
+  Result<Bytes> Read(const LogEntry& entry, std::size_t at_most = kMaxLogMessageBytes) const;
 
  private:
   LogReader(std::string path, int fd, std::uint64_t file_bytes);

@@ -39,7 +39,7 @@ Status Run(const std::string& name, const std::string& folder, const ServiceFact
   StreamHub hub(*bus, name);
   ServiceMonitor monitor(hub, name, station.file.hash());
   bus->Watch(signals, [&bus] { bus->Stop(); });
-  ASSIGN_OR_RETURN(const std::shared_ptr<void> service, factory({station, *bus, hub, monitor}));
+  ASSIGN_OR_RETURN(const std::shared_ptr<void> service, factory({{station, hub, monitor}, *bus}));
   spdlog::info("running on station {}", station.name);
   const Status status = bus->Run();
   monitor.SetState(ServiceState::kStopping, "stopping");

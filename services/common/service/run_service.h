@@ -6,16 +6,12 @@
 #include <string>
 
 #include "services/common/bus/lcm_bus.h"
-#include "services/common/service/service_monitor.h"
-#include "services/common/service/station.h"
+#include "services/common/service/service_parts.h"
 
 namespace forgescan {
 
-struct ServiceContext {
-  const Station& station;
+struct ServiceContext : ServiceParts {
   LcmBus& bus;
-  StreamHub& hub;
-  ServiceMonitor& monitor;
 };
 
 // Makes the service on its concrete drivers; what it returns lives until the service stops.
