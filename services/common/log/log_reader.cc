@@ -4,6 +4,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstring>
@@ -62,10 +63,10 @@ LogReader::~LogReader() {
   }
 }
 
-Result<Bytes> LogReader::Read(const LogEntry& entry) const {
+Result<Bytes> LogReader::Read(const LogEntry& entry, std::size_t at_most) const {
   std::array<std::uint8_t, kMaxLogHeadBytes> head{};
   const std::span<std::uint8_t> head_bytes = std::span(head).first(kLogHeaderBytes + ChannelOf(entry).size());
-  Bytes message(entry.bytes);
+  Bytes message(std::min<std::size_t>(entry.bytes, at_most));
   Status status = ReadFileAt(fd_, entry.offset, head_bytes);
   if (status.ok()) {
     status = ReadFileAt(fd_, entry.offset + head_bytes.size(), message);
