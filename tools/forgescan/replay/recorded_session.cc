@@ -124,7 +124,10 @@ Status RecordedSession::AddAddition(const LogReader& log, const LogEntry& entry)
     return Fail(ErrorCode::kInvalidArgument, "{} is of station {}, {} of station {}: replay them separately",
                 log.path(), opened.station, logs_.front().path(), opened_.station);
   }
-  opened_ = logs_.empty() ? std::move(opened) : opened_;
+  if (logs_.empty()) {
+    opened_ = std::move(opened);
+    ASSIGN_OR_RETURN(types_, LcmTypes::Parse(opened_.types));
+  }
   return {};
 }
 

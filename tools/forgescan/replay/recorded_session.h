@@ -11,6 +11,7 @@
 #include "fsmsg/recording_gap_t.hpp"
 #include "fsmsg/recording_opened_t.hpp"
 #include "services/common/bus/stream_header.h"
+#include "services/common/log/lcm_type.h"
 #include "services/common/log/log_reader.h"
 #include "services/common/result.h"
 
@@ -40,6 +41,8 @@ class RecordedSession {
   std::string Where(const RecordedEvent& event) const;
 
   const fsmsg::recording_opened_t& opened() const { return opened_; }
+  // The message types as they were when the session was recorded.
+  const LcmTypes& types() const { return types_; }
   const std::vector<fsmsg::recorded_file_t>& files() const { return files_; }
   // How many messages of a channel the recordings lost between two that they hold.
   std::int64_t LostBetween(const std::string& channel, const StreamHeader& before,
@@ -57,6 +60,7 @@ class RecordedSession {
   std::vector<LogReader> logs_;
   std::vector<RecordedEvent> events_;
   fsmsg::recording_opened_t opened_{};
+  LcmTypes types_;
   std::vector<fsmsg::recorded_file_t> files_;
   std::vector<fsmsg::recording_gap_t> gaps_;
   std::vector<std::string> findings_;

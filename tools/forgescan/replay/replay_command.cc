@@ -62,16 +62,16 @@ void PrintSome(const char* title, const std::vector<std::string>& lines) {
   }
 }
 
-void PrintComparison(const ResultComparison& comparison) {
+void PrintComparison(const LcmTypes& types, const ResultComparison& comparison) {
   fmt::print("{:<18} {:>8} {:>10} {:>8} {:>6}\n", "channel", "equal", "differing", "missing", "extra");
   for (const auto& [channel, counts] : comparison.channels()) {
     fmt::print("{:<18} {:>8} {:>10} {:>8} {:>6}\n", channel, counts.equal, counts.differing, counts.missing,
                counts.extra);
   }
   if (const auto& first = comparison.first_difference(); first.has_value()) {
-    fmt::print("first difference: {} ({})\n", MessageTitle(first->channel, first->recorded), first->where);
+    fmt::print("first difference: {} ({})\n", MessageTitle(types, first->channel, first->recorded), first->where);
     for (const std::string& line :
-         FieldDifferences(first->channel, first->recorded, first->replayed, kFieldsShown)) {
+         FieldDifferences(types, first->recorded, first->replayed, kFieldsShown)) {
       fmt::print("  {}\n", line);
     }
   }
@@ -140,7 +140,7 @@ Status RunReplay(const ReplayArguments& arguments) {
   ASSIGN_OR_RETURN(const auto outcome, Replay(session, station, options));
   const double took_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
   PrintSome("changed input", outcome.changed_inputs);
-  PrintComparison(outcome.comparison);
+  PrintComparison(session.types(), outcome.comparison);
   const double recorded_s = static_cast<double>(session.duration_us()) * 1e-6;
   fmt::print("{:.1f} s of recording in {:.1f} s, {:.1f} times as fast\n", recorded_s, took_s,
              recorded_s / took_s);

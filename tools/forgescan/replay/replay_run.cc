@@ -54,7 +54,7 @@ class Run {
       const Result<StreamHeader> header = CheckStreamHeader(message);
       if (!header.ok()) {  // the services would not take it either
         outcome_.changed_inputs.push_back(fmt::format("{}: {} is not as it was sent: {}",
-                                                      session_.Where(event), MessageTitle(channel, message),
+                                                      session_.Where(event), MessageTitle(session_.types(), channel, message),
                                                       header.error().message));
         return {};
       }
