@@ -11,11 +11,15 @@ constexpr std::size_t kScanBytes = 1 << 20;
 constexpr std::size_t kProbeBytes = 512;  // a look at one place far away
 constexpr std::uint64_t kMostMissingEvents = 1'000'000;
 
-// The numbers of the two say that `later` was written some events after `earlier`.
-bool Succeeds(std::int64_t earlier, std::int64_t later) {
-  const std::uint64_t step = static_cast<std::uint64_t>(later) - static_cast<std::uint64_t>(earlier);
-  return step >= 1 && step <= kMostMissingEvents;
+// The numbers of the two say that `later` was written some events after `earlier`. They begin at 0 in each
+// log; what only looks like a header has any number.
+std::uint64_t Step(std::int64_t earlier, std::int64_t later) {
+  return static_cast<std::uint64_t>(later) - static_cast<std::uint64_t>(earlier);
 }
+bool Succeeds(std::int64_t earlier, std::int64_t later) {
+  return Step(earlier, later) >= 1 && Step(earlier, later) <= kMostMissingEvents;
+}
+bool IsNext(std::int64_t earlier, std::int64_t later) { return Step(earlier, later) == 1; }
 
 }  // namespace
 
@@ -28,7 +32,7 @@ LogScanner::LogScanner(int fd, std::uint64_t file_bytes)
 Result<LogIndex> LogScanner::Run() {
   for (std::uint64_t at = 0; at < file_bytes_;) {
     const std::optional<LogHeader> event = HeaderAt(walk_, at);
-    if (event && (HeaderAt(walk_, event->end()) || IsSound(*event) || !HasWrongLength(*event))) {
+    if (event && IsCredibleHere(*event)) {
       Accept(*event);
       at = event->end();
       continue;
@@ -76,7 +80,9 @@ std::optional<LogHeader> LogScanner::NextHeader(std::uint64_t from, std::uint64_
 }
 
 bool LogScanner::IsSound(const LogHeader& event) {
-  return event.end() == file_bytes_ || HeaderAt(probe_, event.end()).has_value();
+  const auto next = HeaderAt(probe_, event.end());
+  return event.end() == file_bytes_ ||
+         (next && (next->number == event.number || Succeeds(event.number, next->number)));
 }
 
 std::optional<LogHeader> LogScanner::NextSound(std::uint64_t from, std::uint64_t to) {
@@ -98,28 +104,46 @@ const LogScanner::Ahead& LogScanner::LookAhead(std::uint64_t from) {
   return *ahead_;
 }
 
-bool LogScanner::HasWrongLength(const LogHeader& event) { return IsTooLong(event) || IsTooShort(event); }
+bool LogScanner::IsCredibleHere(const LogHeader& event) {
+  const auto next = HeaderAt(walk_, event.end());
+  if (next && IsNext(event.number, next->number)) {
+    return true;
+  }
+  const bool is_followed = next || event.end() == file_bytes_;
+  return !IsTooLong(event) && (is_followed || !IsTooShort(event));
+}
 
-// Events that lie within the claimed extent and run across its end belong to the file, and the extent is
-// wrong. If they break off before its end, they may as well be a log that the message contains; the numbers
-// tell.
+// An event within the claimed extent that was written after this one, by its number, says so. So does a row
+// of events that runs across the end of the extent; a row that ends before it may as well be a log that the
+// message contains.
 bool LogScanner::IsTooLong(const LogHeader& event) {
-  std::optional<LogHeader> inner = NextSound(event.offset + 1, event.end());
+  std::optional<LogHeader> inner = NextHeader(event.offset + 1, event.end());
   while (inner) {
-    std::uint64_t at = inner->end();
-    while (at < event.end()) {
-      const auto next = HeaderAt(probe_, at);
-      if (!next) {
-        break;
-      }
-      at = next->end();
-    }
-    if (at > event.end() || Succeeds(event.number, inner->number)) {
+    if (Succeeds(event.number, inner->number)) {
       return true;
     }
-    inner = NextSound(at, event.end());
+    std::uint64_t next = inner->offset + 1;
+    if (IsSound(*inner)) {
+      next = EndOfRow(*inner, event.end());
+      if (next > event.end()) {
+        return true;
+      }
+    }
+    inner = NextHeader(next, event.end());
   }
   return false;
+}
+
+std::uint64_t LogScanner::EndOfRow(const LogHeader& first, std::uint64_t to) {
+  std::uint64_t end = first.end();
+  while (end < to) {
+    const auto next = HeaderAt(probe_, end);
+    if (!next) {
+      break;
+    }
+    end = next->end();
+  }
+  return end;
 }
 
 // If no event is missing between this one and the next, the bytes between them are the rest of this one.
@@ -128,7 +152,7 @@ bool LogScanner::IsTooShort(const LogHeader& event) {
   const std::uint64_t to = sound ? sound->offset + 1 : file_bytes_;
   for (auto next = NextHeader(event.end(), to); next; next = NextHeader(next->offset + 1, to)) {
     if (Succeeds(event.number, next->number)) {
-      return next->number == event.number + 1;
+      return IsNext(event.number, next->number);
     }
   }
   return false;

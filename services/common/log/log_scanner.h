@@ -1,9 +1,10 @@
 // Finds the events in a log file, whatever has happened to it.
 //
 // An event is believed when its header is credible (log_header.h), it ends within the file, and what follows
-// is the end of the file or another credible header: a *sound* event. Pixels that happen to contain a sync
-// word are not. An event that is not sound may still be good, with damage behind it, or its length may be
-// wrong; other events within its extent, and the numbers of the events behind it, decide which.
+// is the end of the file or another credible header; where no event is expected, the numbers of the two must
+// be in order too: a *sound* event. Pixels that happen to contain a sync word are not. An event that is not
+// followed so may still be good, with damage behind it, or its length may be wrong; other events within its
+// extent, and the numbers of the events behind it, decide which.
 //
 // Cost: linear in the file where it is damaged, one small read an event where it is not.
 #pragma once
@@ -48,10 +49,12 @@ class LogScanner {
   // Remembered, so that many calls cost one pass.
   const Ahead& LookAhead(std::uint64_t from);
   bool IsSound(const LogHeader& event);
-  // For an event that is not sound: its length cannot be right.
-  bool HasWrongLength(const LogHeader& event);
+  // For an event where one is expected, which need not be sound.
+  bool IsCredibleHere(const LogHeader& event);
   bool IsTooLong(const LogHeader& event);
   bool IsTooShort(const LogHeader& event);
+  // Where the row of events that begins with `first` ends; events beyond `to` are not looked at.
+  std::uint64_t EndOfRow(const LogHeader& first, std::uint64_t to);
   // Where the next event begins after damage at `from`; the end of the file if there is none.
   std::uint64_t Resume(std::uint64_t from);
   bool FitsBetweenNeighbours(const LogHeader& event, const std::optional<LogHeader>& next) const;

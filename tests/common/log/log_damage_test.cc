@@ -199,7 +199,7 @@ TEST_P(LogDamageKindTest, IsFoundAtAnyPlace) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Kinds, LogDamageKindTest, ::testing::ValuesIn(kKinds),
-                         [](const auto& info) { return std::string(info.param.name); });
+                         [](const auto& kind) { return std::string(kind.param.name); });
 
 TEST_F(LogDamageTest, ManyInOneLogLoseNothingElse) {
   for (std::uint64_t seed = 0; seed < 30; ++seed) {
