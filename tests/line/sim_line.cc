@@ -48,7 +48,7 @@ Result<std::unique_ptr<SimLine>> SimLine::Create(RenderedCell& cell, int parts, 
 SimLine::SimLine(RenderedCell& cell, const LineSimConfig& line)
     : cell_(cell), robot_(RobotOf(cell)), line_(line) {
   for (const char* name : {"robot", "trigger", "cooling", "camera_left", "camera_right", "reconstruction",
-                           "fusion", "registration", "report", "observer"}) {
+                           "fusion", "registration", "report", "recorder", "observer"}) {
     hosts_[name] = std::make_unique<Host>(network_, name);
   }
   CameraSimOptions camera;

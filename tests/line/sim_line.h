@@ -74,13 +74,14 @@ class SimLine {
   const std::vector<LineCommand>& commands() const { return line_.sorted(); }
   // Every message from VIEW_CLOUD to VERDICT in order of arrival, with its channel before it.
   const std::vector<Bytes>& published() const { return published_; }
+  // The place of a service, or of one more that a test adds: "recorder".
+  Host& At(const char* name) { return *hosts_.at(name); }
   // Sums over all services.
   StreamCounters StreamTotals() const;
   std::int64_t Total(const std::string& counter) const;
 
  private:
   SimLine(RenderedCell& cell, const LineSimConfig& line);
-  Host& At(const char* name) { return *hosts_.at(name); }
   Status MakeCellServices(const Station& station);
   Status MakeCamera(const Station& station, std::size_t side);
   Status MakeViewServices(const Station& station);
