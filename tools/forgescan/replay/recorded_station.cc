@@ -72,18 +72,29 @@ Status SetValue(toml::table& table, const std::string& change) {
   const toml::table* from = &parsed;
   toml::table* to = &table;
   for (;;) {
-    const auto& [name, node] = *from->begin();
-    const toml::table* below = node.as_table();
+    const auto only = from->begin();
+    const toml::table* below = only->second.as_table();
     if (below == nullptr) {
-      to->insert_or_assign(name, node);
+      to->insert_or_assign(only->first, only->second);
       return {};
     }
-    to = to->insert(name, toml::table{}).first->second.as_table();
+    const auto known = to->insert(only->first, toml::table{}).first;
+    to = known->second.as_table();
     if (to == nullptr) {
-      return Fail(ErrorCode::kInvalidArgument, "--set {}: {} is a value, not a table", change, name.str());
+      return Fail(ErrorCode::kInvalidArgument, "--set {}: {} is a value, not a table", change,
+                  only->first.str());
     }
     from = below;
   }
+}
+
+std::string ValueText(const toml::node& node) {
+  if (const auto* number = node.as_floating_point()) {
+    return fmt::format("{}", number->get());  // as short as it can be; TOML's printer writes all digits
+  }
+  std::ostringstream text;
+  node.visit([&text](const auto& value) { text << value; });
+  return text.str();
 }
 
 // Every value of the table with its dotted name.
@@ -93,9 +104,7 @@ void Flatten(const toml::table& table, const std::string& prefix, std::map<std::
     if (const toml::table* below = node.as_table()) {
       Flatten(*below, key, values);
     } else {
-      std::ostringstream text;
-      node.visit([&text](const auto& value) { text << value; });
-      values[key] = text.str();
+      values[key] = ValueText(node);
     }
   }
 }

@@ -80,7 +80,7 @@ TEST_F(RecordedStationTest, SetsValuesAndNamesThem) {
   const auto station =
       Unpack({.config = "", .values = {"fusion.view_timeout_s=30.5", "report.deviation_scale_mm=0.2"}, .files = {}});
   ASSERT_TRUE(station.ok()) << station.error().message;
-  EXPECT_THAT(Changes(*station), ElementsAre("fusion.view_timeout_s = 30.5, recorded as 60.0",
+  EXPECT_THAT(Changes(*station), ElementsAre("fusion.view_timeout_s = 30.5, recorded as 60",
                                              "report.deviation_scale_mm = 0.2, recorded as the default"));
 }
 
@@ -93,7 +93,7 @@ TEST_F(RecordedStationTest, TakesAnotherConfigurationAndOtherFiles) {
   ASSERT_TRUE(station.ok()) << station.error().message;
   EXPECT_EQ(Text(station->calibration), "another");
   EXPECT_THAT(Changes(*station), Contains(HasSubstr("calibration is another file")));
-  EXPECT_THAT(Changes(*station), Contains("fusion.view_timeout_s = 61.0, recorded as 60.0"));
+  EXPECT_THAT(Changes(*station), Contains("fusion.view_timeout_s = 61, recorded as 60"));
 }
 
 TEST_F(RecordedStationTest, RefusesWhatIsNoValue) {
