@@ -10,8 +10,8 @@ Result<std::shared_ptr<void>> MakeRegistrationService(const ServiceParts& parts)
                    RegistrationConfig::Load(parts.station.file.Table("registration")));
   ASSIGN_OR_RETURN(const ModelBundle bundle, ReadBundle(parts.station.model));
   ASSIGN_OR_RETURN(RegistrationModel model, RegistrationModel::Build(bundle));
-  return std::shared_ptr<void>(std::make_shared<RegistrationService>(parts.hub, parts.monitor,
-                                                                     std::move(config), std::move(model)));
+  return std::shared_ptr<void>(
+      std::make_shared<RegistrationService>(parts.hub, parts.monitor, std::move(config), std::move(model)));
 }
 
 }  // namespace forgescan

@@ -9,6 +9,7 @@
 
 #include "services/recorder/recorder_service.h"
 #include "tests/line/sim_line.h"
+#include "tools/forgescan/replay/message_text.h"
 #include "tools/forgescan/replay/replay_run.h"
 #include "tools/forgescan/replay/scratch_folder.h"
 #include "tools/forgescan/replay/what_if.h"
@@ -20,11 +21,11 @@ namespace fs = std::filesystem;
 using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-using ::testing::IsEmpty;
-using ::testing::SizeIs;
 using testing::Host;
+using ::testing::IsEmpty;
 using testing::RenderedCell;
 using testing::SimLine;
+using ::testing::SizeIs;
 
 constexpr int kParts = 3;
 constexpr std::int64_t kSettleUs = 10'000'000;  // until the last part's file is closed
@@ -39,7 +40,8 @@ class ReplayLineTest : public ::testing::Test {
     ASSERT_TRUE(folder.ok()) << folder.error().message;
     folder_ = std::make_unique<ScratchFolder>(std::move(*folder));
     Record("calm", {});
-    Record("lossy", {.loss = 0.03, .large_loss = 0.3, .duplicate = 0.05, .latency_us = 200, .jitter_us = 3000});
+    Record("lossy",
+           {.loss = 0.03, .large_loss = 0.3, .duplicate = 0.05, .latency_us = 200, .jitter_us = 3000});
   }
   static void TearDownTestSuite() {
     cell_.reset();
@@ -134,8 +136,10 @@ TEST_F(ReplayLineTest, ASessionReplaysByteForByteWithAnyNumberOfThreads) {
   for (const char* threads : {"1", "2", "4"}) {
     SCOPED_TRACE(threads);
     const std::string value = std::string("threads=") + threads;
-    ExpectSame(Compute(session, false, {.config = "", .values = {"reconstruction." + value, "registration." + value}, .files = {}}),
-               session);
+    ExpectSame(
+        Compute(session, false,
+                {.config = "", .values = {"reconstruction." + value, "registration." + value}, .files = {}}),
+        session);
   }
 }
 
@@ -182,7 +186,8 @@ TEST_F(ReplayLineTest, OneChangedBitOfOnePixelIsFoundAndNamed) {
 
 TEST_F(ReplayLineTest, AChangedParameterIsFoundAndNamed) {
   const RecordedSession session = Open({Logs("calm")[0]});
-  const StationChanges changes{.config = "", .values = {"reconstruction.publish_every_nth_point=9"}, .files = {}};
+  const StationChanges changes{
+      .config = "", .values = {"reconstruction.publish_every_nth_point=9"}, .files = {}};
   auto scratch = ScratchFolder::Make();
   ASSERT_TRUE(scratch.ok());
   const auto station = UnpackStation(session, changes, scratch->path());

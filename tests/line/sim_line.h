@@ -19,11 +19,6 @@
 #include "services/common/bus/sim_bus.h"
 #include "services/common/service/station.h"
 #include "services/cooling/cooling_service.h"
-#include "services/fusion/fusion_service.h"
-#include "services/reconstruction/reconstruction_service.h"
-#include "services/registration/registration_service.h"
-#include "services/report/model_evaluator.h"
-#include "services/report/report_service.h"
 #include "services/robot/robot_service.h"
 #include "services/trigger/trigger_service.h"
 #include "tests/line/rendered_cell.h"
@@ -84,8 +79,7 @@ class SimLine {
   SimLine(RenderedCell& cell, const LineSimConfig& line);
   Status MakeCellServices(const Station& station);
   Status MakeCamera(const Station& station, std::size_t side);
-  Status MakeViewServices(const Station& station);
-  Status MakePartServices(const Station& station);
+  Status MakeComputeServices(const Station& station);
   void Observe();
   void Record(const char* channel);
   void Expose(const TriggerSim::Edge& edge);
@@ -104,11 +98,7 @@ class SimLine {
   std::unique_ptr<TriggerService> trigger_service_;
   std::unique_ptr<CoolingService> cooling_service_;
   std::array<std::unique_ptr<CameraService>, 2> camera_services_;
-  std::unique_ptr<ReconstructionService> reconstruction_service_;
-  std::unique_ptr<FusionService> fusion_service_;
-  std::unique_ptr<RegistrationService> registration_service_;
-  std::unique_ptr<ModelEvaluator> evaluator_;
-  std::shared_ptr<ReportService> report_service_;  // after the evaluator: it goes first
+  std::vector<std::shared_ptr<void>> compute_services_;  // reconstruction, fusion, registration, report
 
   std::vector<fsmsg::view_captured_t> views_;
   std::vector<fsmsg::scan_complete_t> scans_;

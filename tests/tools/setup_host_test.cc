@@ -39,7 +39,9 @@ class SetupHost : public ::testing::Test {
     output.exit_code = WEXITSTATUS(pclose(pipe));
     return output;
   }
-  Output CallOnRoot(const std::string& option = "") const { return Call(option + " --root " + root_.string()); }
+  Output CallOnRoot(const std::string& option = "") const {
+    return Call(option + " --root " + root_.string());
+  }
   std::string Read(const char* path) const {
     std::ifstream stream(root_ / path);
     return {std::istreambuf_iterator<char>(stream), {}};

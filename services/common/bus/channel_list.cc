@@ -1,5 +1,7 @@
 #include "services/common/bus/channel_list.h"
 
+#include <algorithm>
+
 #include "services/common/bus/channels.h"
 
 namespace forgescan {
@@ -30,6 +32,13 @@ std::vector<ChannelInfo> AllChannels() {
           Info(kVerdict),          Info(kPartSorted),      Info(kReconstructionTime), Info(kFusionTime),
           Info(kRegistrationTime), Info(kPathState),       Info(kCoolingState),       Info(kRecorderState),
           Info(kServiceState),     Info(kRecordingOpened), Info(kRecordedFile),       Info(kRecordingClosed)};
+}
+
+bool IsStateChannel(std::string_view channel) {
+  static const std::vector<ChannelInfo> channels = AllChannels();
+  return std::any_of(channels.begin(), channels.end(), [channel](const ChannelInfo& info) {
+    return info.kind == ChannelKind::kState && channel == info.name;
+  });
 }
 
 }  // namespace forgescan

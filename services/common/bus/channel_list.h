@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string_view>
 #include <vector>
 
 namespace forgescan {
@@ -17,5 +18,7 @@ struct ChannelInfo {
 
 // In the order of channels.h.
 std::vector<ChannelInfo> AllChannels();
+// False for a channel that is not in the list.
+bool IsStateChannel(std::string_view channel);
 
 }  // namespace forgescan

@@ -1,8 +1,8 @@
 // forgescan play LOG...: a recording on a live bus.
 #include <algorithm>
 
+#include "services/common/bus/channel_list.h"
 #include "services/common/bus/lcm_bus.h"
-#include "services/common/bus/state_channels.h"
 #include "services/common/bus/stream_hub.h"
 #include "tools/finite_range.h"
 #include "tools/forgescan/command.h"

@@ -4,9 +4,9 @@
 #include <set>
 #include <string_view>
 
+#include "services/common/bus/channel_list.h"
 #include "services/common/bus/channels.h"
 #include "services/common/bus/codec.h"
-#include "services/common/bus/state_channels.h"
 
 namespace forgescan {
 namespace {

@@ -65,8 +65,8 @@ Status SetValue(toml::table& table, const std::string& change) {
   const std::size_t equals = change.find('=');
   const std::string key = change.substr(0, equals);
   if (equals == std::string::npos || key.find('.') == std::string::npos) {
-    return Fail(ErrorCode::kInvalidArgument, "--set {}: wanted is table.key=value, e.g. fusion.view_timeout_s=30",
-                change);
+    return Fail(ErrorCode::kInvalidArgument,
+                "--set {}: wanted is table.key=value, e.g. fusion.view_timeout_s=30", change);
   }
   ASSIGN_OR_RETURN(const toml::table parsed, ParseToml(change, "--set " + change));
   const toml::table* from = &parsed;
@@ -98,7 +98,8 @@ std::string ValueText(const toml::node& node) {
 }
 
 // Every value of the table with its dotted name.
-void Flatten(const toml::table& table, const std::string& prefix, std::map<std::string, std::string>& values) {
+void Flatten(const toml::table& table, const std::string& prefix,
+             std::map<std::string, std::string>& values) {
   for (const auto& [name, node] : table) {
     const std::string key = prefix.empty() ? std::string(name.str()) : prefix + "." + std::string(name.str());
     if (const toml::table* below = node.as_table()) {

@@ -13,16 +13,16 @@
 namespace forgescan {
 
 struct StationChanges {
-  std::string config;                              // another station.toml; empty = the recorded one
-  std::vector<std::string> values;                 // "table.key=value", value as in TOML
-  std::map<std::string, std::string> files;        // by role (calibration, pattern, views, model, features)
+  std::string config;                        // another station.toml; empty = the recorded one
+  std::vector<std::string> values;           // "table.key=value", value as in TOML
+  std::map<std::string, std::string> files;  // by role (calibration, pattern, views, model, features)
   bool Any() const { return !config.empty() || !values.empty() || !files.empty(); }
 };
 
-// Writes the recorded files with the changes to `folder` (which exists and is empty) and loads the station from
-// it. Results go to `folder`/results. Errors: kNotFound (a file the station needs is not in the recording, or a
-// file the user named does not exist), kInvalidArgument (a value that is no table.key=value), kIo, and those
-// of Station::Load.
+// Writes the recorded files with the changes to `folder` (which exists and is empty) and loads the station
+// from it. Results go to `folder`/results. Errors: kNotFound (a file the station needs is not in the
+// recording, or a file the user named does not exist), kInvalidArgument (a value that is no table.key=value),
+// kIo, and those of Station::Load.
 Result<Station> UnpackStation(const RecordedSession& session, const StationChanges& changes,
                               const std::filesystem::path& folder);
 

@@ -69,9 +69,9 @@ void PrintComparison(const LcmTypes& types, const ResultComparison& comparison) 
                counts.extra);
   }
   if (const auto& first = comparison.first_difference(); first.has_value()) {
-    fmt::print("first difference: {} ({})\n", MessageTitle(types, first->channel, first->recorded), first->where);
-    for (const std::string& line :
-         FieldDifferences(types, first->recorded, first->replayed, kFieldsShown)) {
+    fmt::print("first difference: {} ({})\n", MessageTitle(types, first->channel, first->recorded),
+               first->where);
+    for (const std::string& line : FieldDifferences(types, first->recorded, first->replayed, kFieldsShown)) {
       fmt::print("  {}\n", line);
     }
   }
@@ -116,8 +116,8 @@ Status RunReplay(const ReplayArguments& arguments) {
   spdlog::set_level(spdlog::level::off);  // what the services had to say is in the recording
   ASSIGN_OR_RETURN(const auto session, RecordedSession::Open(arguments.logs));
   ASSIGN_OR_RETURN(const ScratchFolder scratch, ScratchFolder::Make());
-  ASSIGN_OR_RETURN(Station station, UnpackStation(session, WithThreads(arguments.changes, arguments.threads),
-                                                  scratch.path()));
+  ASSIGN_OR_RETURN(Station station,
+                   UnpackStation(session, WithThreads(arguments.changes, arguments.threads), scratch.path()));
   if (!arguments.results.empty()) {
     station.results = arguments.results;
   }
@@ -154,8 +154,8 @@ Status RunReplay(const ReplayArguments& arguments) {
 
 void AddReplayCommand(CLI::App& app, Status& outcome) {
   static ReplayArguments arguments;
-  CLI::App* command = app.add_subcommand(
-      "replay", "compute a recorded session again and compare every result byte for byte");
+  CLI::App* command =
+      app.add_subcommand("replay", "compute a recorded session again and compare every result byte for byte");
   command->add_option("LOG", arguments.logs, "recordings of parts, in any order")->required();
   command->add_option("--service", arguments.services,
                       "only this one: reconstruction, fusion, registration or report; may be repeated");

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
+#include "services/common/bus/channel_list.h"
 #include "services/common/bus/channels.h"
-#include "services/common/bus/state_channels.h"
 #include "services/common/bus/stream_header.h"
 
 namespace forgescan {

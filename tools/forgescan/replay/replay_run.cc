@@ -3,7 +3,7 @@
 #include <map>
 #include <memory>
 
-#include "services/common/bus/state_channels.h"
+#include "services/common/bus/channel_list.h"
 #include "services/common/bus/stream_header.h"
 #include "tools/forgescan/replay/message_text.h"
 #include "tools/forgescan/replay/replay_network.h"
@@ -53,9 +53,9 @@ class Run {
     if (!IsStateChannel(channel)) {
       const Result<StreamHeader> header = CheckStreamHeader(message);
       if (!header.ok()) {  // the services would not take it either
-        outcome_.changed_inputs.push_back(fmt::format("{}: {} is not as it was sent: {}",
-                                                      session_.Where(event), MessageTitle(session_.types(), channel, message),
-                                                      header.error().message));
+        outcome_.changed_inputs.push_back(
+            fmt::format("{}: {} is not as it was sent: {}", session_.Where(event),
+                        MessageTitle(session_.types(), channel, message), header.error().message));
         return {};
       }
       lost_before = LostBefore(channel, *header);

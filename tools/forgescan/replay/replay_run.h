@@ -19,8 +19,8 @@ struct ReplayOptions {
   // Called now and then with the share that is done, 0..1.
   std::function<void(double)> on_progress = [](double) {};
   // Every result of the services, in the order of the replay.
-  std::function<void(const std::string& channel, ByteView message)> on_result =
-      [](const std::string&, ByteView) {};
+  std::function<void(const std::string& channel, ByteView message)> on_result = [](const std::string&,
+                                                                                   ByteView) {};
 };
 
 struct ReplayOutcome {

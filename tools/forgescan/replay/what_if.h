@@ -12,9 +12,9 @@ namespace forgescan {
 
 struct DimensionChange {
   std::string name;
-  double lower_mm, upper_mm;        // limits now
-  double recorded_mm, now_mm;       // measured; NaN when not determined
-  double recorded_u_mm, now_u_mm;   // expanded uncertainty; NaN when not determined
+  double lower_mm, upper_mm;                  // limits now
+  double recorded_mm, now_mm;                 // measured; NaN when not determined
+  double recorded_u_mm, now_u_mm;             // expanded uncertainty; NaN when not determined
   std::int8_t recorded_verdict, now_verdict;  // verdict_t.VERDICT_*; UNKNOWN = not there
 
   bool Flipped() const { return recorded_verdict != now_verdict; }
@@ -22,7 +22,7 @@ struct DimensionChange {
 
 struct PartChange {
   int part = 0;
-  std::int64_t utime = 0;  // of the verdict
+  std::int64_t utime = 0;                             // of the verdict
   std::int8_t recorded_verdict = 0, now_verdict = 0;  // UNKNOWN = none
   std::string recorded_reason, now_reason;
   std::vector<DimensionChange> dimensions;

@@ -43,7 +43,8 @@ std::vector<Largest> LargestChanges(const std::vector<PartChange>& parts) {
   std::vector<Largest> all;
   for (const PartChange& part : parts) {
     for (const DimensionChange& d : part.dimensions) {
-      auto found = std::find_if(all.begin(), all.end(), [&d](const auto& other) { return other.name == d.name; });
+      auto found =
+          std::find_if(all.begin(), all.end(), [&d](const auto& other) { return other.name == d.name; });
       if (found == all.end()) {
         found = all.insert(all.end(), {d.name, 0.0, part.part, 0});
       }
@@ -126,15 +127,17 @@ std::string WhatIfText(const std::vector<PartChange>& parts) {
 std::string WhatIfHtml(const WhatIfPage& page, const std::vector<PartChange>& parts) {
   std::string rows =
       "<tr><th class=\"t\">Part</th><th class=\"t\">Dimension</th><th>Limits (mm)</th><th>Recorded (mm)</th>"
-      "<th>Now (mm)</th><th>Change (mm)</th><th>U recorded</th><th>U now</th><th class=\"t\">Verdict</th></tr>\n";
+      "<th>Now (mm)</th><th>Change (mm)</th><th>U recorded</th><th>U now</th><th "
+      "class=\"t\">Verdict</th></tr>\n";
   for (const PartChange& part : parts) {
     rows += PartRows(part);
   }
   const std::string flips = fmt::format("{} of {}", Flips(parts), parts.size());
   const std::string body =
-      fmt::format("<header><div><div class=\"over\">What if</div><h1>{} verdicts change</h1>"
-                  "<div class=\"sub\">Station {}</div></div></header>\n",
-                  flips, EscapeHtml(page.station)) +
+      fmt::format(
+          "<header><div><div class=\"over\">What if</div><h1>{} verdicts change</h1>"
+          "<div class=\"sub\">Station {}</div></div></header>\n",
+          flips, EscapeHtml(page.station)) +
       Section("Changed settings", page.changes.empty() ? "<p class=\"none\">None.</p>" : List(page.changes)) +
       Section("Parts", "<table>" + rows + "</table>") + Section("Recordings", List(page.recordings));
   return fmt::format(

@@ -3,7 +3,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-
 #include "tests/tools/forgescan/replay/written_recording.h"
 
 namespace forgescan {

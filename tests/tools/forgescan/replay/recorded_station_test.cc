@@ -34,7 +34,9 @@ view_timeout_s = 60.0
 
 class RecordedStationTest : public ::testing::Test {
  protected:
-  void SetUp() override { Record({"calibration.yaml", "pattern.toml", "views.toml", "model.bundle", "features.toml"}); }
+  void SetUp() override {
+    Record({"calibration.yaml", "pattern.toml", "views.toml", "model.bundle", "features.toml"});
+  }
   void Record(const std::vector<std::string>& files) {
     std::filesystem::remove(folder_ / "one.lcmlog");
     WrittenRecording recording(folder_ / "one.lcmlog");
@@ -50,7 +52,9 @@ class RecordedStationTest : public ::testing::Test {
     std::filesystem::remove_all(unpacked_);
     std::filesystem::create_directories(unpacked_);
   }
-  Result<Station> Unpack(const StationChanges& changes) { return UnpackStation(*session_, changes, unpacked_); }
+  Result<Station> Unpack(const StationChanges& changes) {
+    return UnpackStation(*session_, changes, unpacked_);
+  }
   std::vector<std::string> Changes(const Station& station) {
     const auto changes = DescribeChanges(*session_, station);
     EXPECT_TRUE(changes.ok()) << changes.error().message;
@@ -77,19 +81,19 @@ TEST_F(RecordedStationTest, IsTheRecordedOneWithoutChanges) {
 }
 
 TEST_F(RecordedStationTest, SetsValuesAndNamesThem) {
-  const auto station =
-      Unpack({.config = "", .values = {"fusion.view_timeout_s=30.5", "report.deviation_scale_mm=0.2"}, .files = {}});
+  const auto station = Unpack(
+      {.config = "", .values = {"fusion.view_timeout_s=30.5", "report.deviation_scale_mm=0.2"}, .files = {}});
   ASSERT_TRUE(station.ok()) << station.error().message;
   EXPECT_THAT(Changes(*station), ElementsAre("fusion.view_timeout_s = 30.5, recorded as 60",
                                              "report.deviation_scale_mm = 0.2, recorded as the default"));
 }
 
 TEST_F(RecordedStationTest, TakesAnotherConfigurationAndOtherFiles) {
-  std::ofstream(folder_ / "other.toml") << std::string(kStation).replace(
-      std::string(kStation).find("60.0"), 4, "61.0");
+  std::ofstream(folder_ / "other.toml")
+      << std::string(kStation).replace(std::string(kStation).find("60.0"), 4, "61.0");
   std::ofstream(folder_ / "stereo.yaml") << "another";
-  const auto station =
-      Unpack({.config = folder_ / "other.toml", .values = {}, .files = {{"calibration", folder_ / "stereo.yaml"}}});
+  const auto station = Unpack(
+      {.config = folder_ / "other.toml", .values = {}, .files = {{"calibration", folder_ / "stereo.yaml"}}});
   ASSERT_TRUE(station.ok()) << station.error().message;
   EXPECT_EQ(Text(station->calibration), "another");
   EXPECT_THAT(Changes(*station), Contains(HasSubstr("calibration is another file")));
@@ -97,8 +101,8 @@ TEST_F(RecordedStationTest, TakesAnotherConfigurationAndOtherFiles) {
 }
 
 TEST_F(RecordedStationTest, RefusesWhatIsNoValue) {
-  for (const char* change : {"fusion", "view_timeout_s=3", "fusion.view_timeout_s=", "fusion.view_timeout_s=a b",
-                             "fusion.view_timeout_s.x=1"}) {
+  for (const char* change : {"fusion", "view_timeout_s=3", "fusion.view_timeout_s=",
+                             "fusion.view_timeout_s=a b", "fusion.view_timeout_s.x=1"}) {
     const auto station = Unpack({.config = "", .values = {change}, .files = {}});
     ASSERT_FALSE(station.ok()) << change;
     EXPECT_THAT(station.error().message, HasSubstr(change));
