@@ -21,6 +21,7 @@
 #include "services/cooling/cooling_service.h"
 #include "services/fusion/fusion_service.h"
 #include "services/reconstruction/reconstruction_service.h"
+#include "services/recorder/recorder_service.h"
 #include "services/registration/registration_service.h"
 #include "services/report/model_evaluator.h"
 #include "services/report/report_service.h"
@@ -74,6 +75,8 @@ class SimLine {
   const std::vector<LineCommand>& commands() const { return line_.sorted(); }
   // Every message from VIEW_CLOUD to VERDICT in order of arrival, with its channel before it.
   const std::vector<Bytes>& published() const { return published_; }
+  // Closes the recordings, as SIGTERM does; returns their folder.
+  std::string StopRecording();
   // Sums over all services.
   StreamCounters StreamTotals() const;
   std::int64_t Total(const std::string& counter) const;
@@ -85,6 +88,7 @@ class SimLine {
   Status MakeCamera(const Station& station, std::size_t side);
   Status MakeViewServices(const Station& station);
   Status MakePartServices(const Station& station);
+  Status MakeRecorder(const Station& station);
   void Observe();
   void Record(const char* channel);
   void Expose(const TriggerSim::Edge& edge);
@@ -108,6 +112,7 @@ class SimLine {
   std::unique_ptr<RegistrationService> registration_service_;
   std::unique_ptr<ModelEvaluator> evaluator_;
   std::shared_ptr<ReportService> report_service_;  // after the evaluator: it goes first
+  std::unique_ptr<RecorderService> recorder_service_;
 
   std::vector<fsmsg::view_captured_t> views_;
   std::vector<fsmsg::scan_complete_t> scans_;
