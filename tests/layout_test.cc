@@ -169,8 +169,8 @@ TEST(Layout, FilesAndMainsAreShort) {
 }
 
 TEST(Layout, EveryServiceHasItsPageAndItsMain) {
-  const std::set<std::string> services = {"trigger",        "camera", "robot",        "cooling",
-                                          "reconstruction", "fusion", "registration", "report"};
+  const std::set<std::string> services = {"trigger", "camera",       "robot",  "cooling", "reconstruction",
+                                          "fusion",  "registration", "report", "recorder"};
   for (const std::string& name : services) {
     for (const char* file : {"README.md", "main.cc"}) {
       EXPECT_TRUE(fs::exists(kSource / "services" / name / file)) << name << " has no " << file;

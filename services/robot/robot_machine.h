@@ -85,6 +85,8 @@ class RobotMachine {
   Actions OnCapture(const CaptureReport& report,
                     std::int64_t now_us);  // illegal unless capturing that view and attempt
   Actions OnInterlock(bool stop, const std::string& reason, std::int64_t now_us);
+  // Why the next part must not be begun, though one in work may be finished; empty = it may.
+  void HoldNextPart(std::string reason) { hold_reason_ = std::move(reason); }
   Actions OnTick(std::int64_t now_us);
 
  private:
@@ -117,6 +119,7 @@ class RobotMachine {
   std::optional<std::int32_t> last_part_;
   bool stop_ = false;
   std::string stop_reason_;
+  std::string hold_reason_;
 
   RobotCommand order_;
   bool echoed_ = false;

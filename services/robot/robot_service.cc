@@ -47,6 +47,9 @@ RobotService::RobotService(StreamHub& hub, ServiceMonitor& monitor, const Device
   if (config_.cooling_timeout_s > 0) {  // until the cooling service has spoken
     Do(machine_.OnInterlock(true, "no state of the cooling yet", Now()));
   }
+  if (config_.require_recording) {
+    machine_.HoldNextPart("recording interlock: no state of the recorder yet");
+  }
   ShowState();
 }
 
@@ -73,12 +76,15 @@ void RobotService::Subscribe() {
                       m.interlock == fsmsg::cooling_state_t::INTERLOCK_WARN;  // UNKNOWN stops
     Do(machine_.OnInterlock(!free, m.reason, Now()));
   });
+  SubscribeState<fsmsg::recorder_state_t>(hub_.bus(), kRecorderState,
+                                          [this](const fsmsg::recorder_state_t& m) { OnRecorder(m); });
 }
 
 void RobotService::Step() {
   devices_.robot.Step(Now());
   devices_.line.Step(Now());
   WatchCooling();
+  WatchRecorder();
   Do(machine_.OnTick(Now()));
   DoSort(sorter_.OnTick(Now()));
 }
@@ -88,6 +94,24 @@ void RobotService::WatchCooling() {
   if (watched && 1e-6 * static_cast<double>(Now() - last_cooling_us_) > config_.cooling_timeout_s) {
     last_cooling_us_ = 0;
     Do(machine_.OnInterlock(true, "the cooling service is silent", Now()));
+  }
+}
+
+// An inspection without its record is the lesser evil than one broken off: only the next part has to wait.
+void RobotService::OnRecorder(const fsmsg::recorder_state_t& recorder) {
+  if (!config_.require_recording) {
+    return;
+  }
+  last_recorder_us_ = Now();
+  const bool recording = recorder.status == fsmsg::recorder_state_t::STATUS_RECORDING;  // UNKNOWN holds
+  machine_.HoldNextPart(recording ? "" : fmt::format("recording interlock: {}", recorder.reason));
+}
+
+void RobotService::WatchRecorder() {
+  if (last_recorder_us_ != 0 &&
+      1e-6 * static_cast<double>(Now() - last_recorder_us_) > config_.recording_timeout_s) {
+    last_recorder_us_ = 0;
+    machine_.HoldNextPart("recording interlock: the recorder is silent");
   }
 }
 

@@ -32,6 +32,8 @@ class RobotService {
   void OnLine(const LineEvent& event);
   void OnVerdict(const fsmsg::verdict_t& verdict);
   void WatchCooling();
+  void OnRecorder(const fsmsg::recorder_state_t& recorder);
+  void WatchRecorder();
   void Do(const RobotMachine::Actions& actions);
   void Do(const RobotCommand& command) { Note(devices_.robot.Send(command)); }
   void Do(const PartStarted& start);
@@ -56,6 +58,7 @@ class RobotService {
   double body_degc_;
   double part_degc_;
   std::int64_t last_cooling_us_ = 0;
+  std::int64_t last_recorder_us_ = 0;
   std::string shown_;
   Bus::TimerId timer_;
 };

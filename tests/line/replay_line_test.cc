@@ -7,7 +7,6 @@
 #include <fstream>
 #include <iterator>
 
-#include "services/recorder/recorder_service.h"
 #include "tests/line/sim_line.h"
 #include "tools/forgescan/replay/message_text.h"
 #include "tools/forgescan/replay/replay_run.h"
@@ -18,10 +17,8 @@ namespace forgescan {
 namespace {
 
 namespace fs = std::filesystem;
-using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-using testing::Host;
 using ::testing::IsEmpty;
 using testing::RenderedCell;
 using testing::SimLine;
@@ -52,20 +49,10 @@ class ReplayLineTest : public ::testing::Test {
   static void Record(const std::string& name, const SimFaults& faults) {
     auto line = SimLine::Create(*cell_, kParts);
     ASSERT_TRUE(line.ok()) << line.error().message;
-    const auto station = Station::Load(cell_->folder().string());
-    ASSERT_TRUE(station.ok()) << station.error().message;
-    const auto files = StationFilesOf(*station);
-    ASSERT_TRUE(files.ok()) << files.error().message;
-    RecorderConfig config;
-    config.folder = (folder_->path() / name).string();
-    config.min_free_mb = 100;
-    Host& host = (*line)->At("recorder");
-    auto recorder = RecorderService::Create(host.hub, host.monitor, config,
-                                            {station->name, "0", "test", station->file.hash(), *files});
-    ASSERT_TRUE(recorder.ok()) << recorder.error().message;
     (*line)->SetBusFaults(faults);
     ASSERT_TRUE((*line)->RunUntilSorted(kParts));
     (*line)->RunFor(kSettleUs);
+    fs::rename((*line)->StopRecording(), folder_->path() / name);
     EXPECT_EQ((*line)->StreamTotals().missing, 0);
     EXPECT_TRUE(faults.loss == 0.0 || (*line)->StreamTotals().recovered > 0);
   }

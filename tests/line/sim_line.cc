@@ -33,11 +33,14 @@ LineSimConfig LineOf(int parts, int first_part) {
   return config;
 }
 
+std::string RecordingsOf(const RenderedCell& cell) { return (cell.folder() / "recordings").string(); }
+
 }  // namespace
 
 Result<std::unique_ptr<SimLine>> SimLine::Create(RenderedCell& cell, int parts, int first_part) {
   std::unique_ptr<SimLine> line(new SimLine(cell, LineOf(parts, first_part)));
   ASSIGN_OR_RETURN(const Station station, Station::Load(cell.folder().string()));
+  RETURN_IF_ERROR(line->MakeRecorder(station));
   RETURN_IF_ERROR(line->MakeCellServices(station));
   RETURN_IF_ERROR(line->MakeCamera(station, 0));
   RETURN_IF_ERROR(line->MakeCamera(station, 1));
@@ -105,6 +108,24 @@ Status SimLine::MakeComputeServices(const Station& station) {
     ASSIGN_OR_RETURN(compute_services_.emplace_back(), make(parts(name)));
   }
   return {};
+}
+
+Status SimLine::MakeRecorder(const Station& station) {
+  ASSIGN_OR_RETURN(RecorderConfig config, RecorderConfig::Load(station.file.Table("recorder")));
+  config.folder = RecordingsOf(cell_);
+  std::error_code ignored;  // there may be none
+  std::filesystem::remove_all(config.folder, ignored);
+  ASSIGN_OR_RETURN(std::vector<StationFile> files, StationFilesOf(station));
+  ASSIGN_OR_RETURN(recorder_service_,
+                   RecorderService::Create(At("recorder").hub, At("recorder").monitor, config,
+                                           {station.name, "0", "", station.file.hash(), std::move(files)}));
+  recorder_service_->Drain();  // it records before the first part comes, however short that is in real time
+  return {};
+}
+
+std::string SimLine::StopRecording() {
+  recorder_service_.reset();
+  return RecordingsOf(cell_);
 }
 
 void SimLine::Observe() {

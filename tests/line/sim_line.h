@@ -19,6 +19,7 @@
 #include "services/common/bus/sim_bus.h"
 #include "services/common/service/station.h"
 #include "services/cooling/cooling_service.h"
+#include "services/recorder/recorder_service.h"
 #include "services/robot/robot_service.h"
 #include "services/trigger/trigger_service.h"
 #include "tests/line/rendered_cell.h"
@@ -69,17 +70,19 @@ class SimLine {
   const std::vector<LineCommand>& commands() const { return line_.sorted(); }
   // Every message from VIEW_CLOUD to VERDICT in order of arrival, with its channel before it.
   const std::vector<Bytes>& published() const { return published_; }
-  // The place of a service, or of one more that a test adds: "recorder".
-  Host& At(const char* name) { return *hosts_.at(name); }
+  // Closes the recordings, as SIGTERM does; returns their folder.
+  std::string StopRecording();
   // Sums over all services.
   StreamCounters StreamTotals() const;
   std::int64_t Total(const std::string& counter) const;
 
  private:
   SimLine(RenderedCell& cell, const LineSimConfig& line);
+  Host& At(const char* name) { return *hosts_.at(name); }
   Status MakeCellServices(const Station& station);
   Status MakeCamera(const Station& station, std::size_t side);
   Status MakeComputeServices(const Station& station);
+  Status MakeRecorder(const Station& station);
   void Observe();
   void Record(const char* channel);
   void Expose(const TriggerSim::Edge& edge);
@@ -99,6 +102,7 @@ class SimLine {
   std::unique_ptr<CoolingService> cooling_service_;
   std::array<std::unique_ptr<CameraService>, 2> camera_services_;
   std::vector<std::shared_ptr<void>> compute_services_;  // reconstruction, fusion, registration, report
+  std::unique_ptr<RecorderService> recorder_service_;
 
   std::vector<fsmsg::view_captured_t> views_;
   std::vector<fsmsg::scan_complete_t> scans_;

@@ -4,7 +4,6 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <lcm/eventlog.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
@@ -12,37 +11,15 @@
 #include <filesystem>
 #include <fstream>
 
+#include "tests/common/log/read_log.h"
+
 namespace forgescan {
 namespace {
 
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
-
-struct Event {
-  std::int64_t number;
-  std::int64_t utime;
-  std::string channel;
-  Bytes message;
-  bool operator==(const Event&) const = default;
-};
-
-std::vector<Event> ReadWithLcm(const std::string& path) {
-  std::vector<Event> events;
-  lcm_eventlog_t* log = lcm_eventlog_create(path.c_str(), "r");
-  EXPECT_NE(log, nullptr) << path;
-  if (log == nullptr) {
-    return events;
-  }
-  while (lcm_eventlog_event_t* event = lcm_eventlog_read_next_event(log)) {
-    const auto* data = static_cast<const std::uint8_t*>(event->data);
-    events.push_back({event->eventnum, event->timestamp,
-                      std::string(event->channel, static_cast<std::size_t>(event->channellen)),
-                      Bytes(data, data + event->datalen)});
-    lcm_eventlog_free_event(event);
-  }
-  lcm_eventlog_destroy(log);
-  return events;
-}
+using testing::LogEvent;
+using testing::ReadLog;
 
 // No file of this process may grow beyond a size: writes then fail as on a full disk, with another reason.
 class FileSizeLimit {
@@ -97,8 +74,8 @@ TEST_F(LogWriterTest, LcmReadsWhatWasWritten) {
   ASSERT_TRUE(writer->Close().ok());
   EXPECT_FALSE(fs::exists(Path() + ".part"));
   EXPECT_EQ(static_cast<std::uintmax_t>(writer->file_bytes()), fs::file_size(Path()));
-  const std::vector<Event> wanted{{0, 10, "ONE", message_}, {1, 20, "TWO", large}, {2, 20, "EMPTY", {}}};
-  EXPECT_EQ(ReadWithLcm(Path()), wanted);
+  const std::vector<LogEvent> wanted{{0, 10, "ONE", message_}, {1, 20, "TWO", large}, {2, 20, "EMPTY", {}}};
+  EXPECT_EQ(ReadLog(Path()), wanted);
 }
 
 TEST_F(LogWriterTest, EveryEventIsInTheFileWhenWriteReturns) {
@@ -106,7 +83,7 @@ TEST_F(LogWriterTest, EveryEventIsInTheFileWhenWriteReturns) {
   ASSERT_TRUE(writer.ok());
   ASSERT_TRUE(writer->Write("ONE", 10, message_).ok());
   EXPECT_EQ(fs::file_size(Path() + ".part"), static_cast<std::uintmax_t>(writer->file_bytes()));
-  EXPECT_EQ(ReadWithLcm(Path() + ".part").size(), 1u);
+  EXPECT_EQ(ReadLog(Path() + ".part").size(), 1u);
 }
 
 TEST_F(LogWriterTest, ClosesUnderANameThatIsKnownOnlyThen) {
@@ -115,7 +92,7 @@ TEST_F(LogWriterTest, ClosesUnderANameThatIsKnownOnlyThen) {
   ASSERT_TRUE(writer->Write("ONE", 10, message_).ok());
   ASSERT_TRUE(writer->CloseAs(Path("a_OK.lcmlog")).ok());
   EXPECT_EQ(writer->path(), Path("a_OK.lcmlog"));
-  EXPECT_EQ(ReadWithLcm(Path("a_OK.lcmlog")).size(), 1u);
+  EXPECT_EQ(ReadLog(Path("a_OK.lcmlog")).size(), 1u);
   EXPECT_FALSE(fs::exists(Path()));
   EXPECT_FALSE(fs::exists(Path() + ".part"));
 }
@@ -135,7 +112,7 @@ TEST_F(LogWriterTest, AFileThatAppearsMeanwhileIsNotReplaced) {
   std::ofstream(Path()) << "precious";
   EXPECT_FALSE(writer->Close().ok());
   EXPECT_EQ(fs::file_size(Path()), 8u);
-  EXPECT_EQ(ReadWithLcm(Path() + ".part").size(), 1u);
+  EXPECT_EQ(ReadLog(Path() + ".part").size(), 1u);
 }
 
 TEST_F(LogWriterTest, AFolderThatIsNotThereIsAnError) {
@@ -149,7 +126,7 @@ TEST_F(LogWriterTest, WrongEventsAreRefusedAndTheNextIsWritten) {
   EXPECT_EQ(writer->Write(std::string(64, 'X'), 10, message_).error().code, ErrorCode::kInvalidArgument);
   EXPECT_EQ(writer->Write("ONE", 10, Bytes(64'000'001)).error().code, ErrorCode::kInvalidArgument);
   EXPECT_TRUE(writer->Write(std::string(63, 'X'), 10, message_).ok());
-  EXPECT_EQ(ReadWithLcm(Path() + ".part").size(), 1u);
+  EXPECT_EQ(ReadLog(Path() + ".part").size(), 1u);
 }
 
 TEST_F(LogWriterTest, AfterAFailedWriteTheFileEndsWithAWholeEvent) {
@@ -168,7 +145,7 @@ TEST_F(LogWriterTest, AfterAFailedWriteTheFileEndsWithAWholeEvent) {
   EXPECT_FALSE(writer->Sync().ok());
   EXPECT_FALSE(writer->Close().ok());
   EXPECT_EQ(fs::file_size(Path() + ".part"), static_cast<std::uintmax_t>(whole_bytes));
-  EXPECT_EQ(ReadWithLcm(Path() + ".part").size(), 1u);
+  EXPECT_EQ(ReadLog(Path() + ".part").size(), 1u);
   EXPECT_FALSE(fs::exists(Path()));
 }
 
@@ -181,7 +158,7 @@ TEST_F(LogWriterTest, ASmallEventThatDoesNotFitIsNoticedAtOnce) {
     ++written;
   }
   EXPECT_EQ(written, 100 / (28 + 3 + message_.size()));
-  EXPECT_EQ(ReadWithLcm(Path() + ".part").size(), written);
+  EXPECT_EQ(ReadLog(Path() + ".part").size(), written);
 }
 
 TEST_F(LogWriterTest, AnotherFileWorksAfterAFailedOne) {
@@ -196,7 +173,7 @@ TEST_F(LogWriterTest, AnotherFileWorksAfterAFailedOne) {
   EXPECT_TRUE(writer->Write("ONE", 10, message_).ok());
   EXPECT_TRUE(writer->Close().ok());
   EXPECT_FALSE(writer->Close().ok()) << "once";
-  EXPECT_EQ(ReadWithLcm(Path("b.lcmlog")).size(), 1u);
+  EXPECT_EQ(ReadLog(Path("b.lcmlog")).size(), 1u);
 }
 
 TEST_F(LogWriterTest, ARecordingThatNobodyClosedStaysAPart) {
@@ -207,7 +184,7 @@ TEST_F(LogWriterTest, ARecordingThatNobodyClosedStaysAPart) {
     LogWriter moved = std::move(*writer);
     ASSERT_TRUE(moved.Write("TWO", 20, message_).ok());
   }
-  EXPECT_EQ(ReadWithLcm(Path() + ".part").size(), 2u);
+  EXPECT_EQ(ReadLog(Path() + ".part").size(), 2u);
   EXPECT_FALSE(fs::exists(Path()));
 }
 

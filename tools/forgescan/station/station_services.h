@@ -12,9 +12,11 @@ struct StationService {
   std::vector<std::string> arguments;  // before --station FOLDER
 };
 
-// Consumers before producers, so that nothing is sent to nobody.
+// Consumers before producers, so that nothing is sent to nobody; the recorder before all, so that it hears
+// every word, and after all when they stop.
 inline std::vector<StationService> StationServices() {
-  return {{"report", "forgescan-report", {}},
+  return {{"recorder", "forgescan-recorder", {}},
+          {"report", "forgescan-report", {}},
           {"registration", "forgescan-registration", {}},
           {"fusion", "forgescan-fusion", {}},
           {"reconstruction", "forgescan-reconstruction", {}},
