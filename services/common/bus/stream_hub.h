@@ -51,6 +51,19 @@ class StreamHub {
   void OnLost(const Channel<Message>& channel, StreamReceiver::LostHandler handler) {
     Receiver(channel.name).SetLostHandler(std::move(handler));
   }
+  // Every message once, in order and whole, but not decoded: for whoever keeps messages as they are, of any
+  // channel.
+  void SubscribeRaw(const std::string& channel, StreamReceiver::Handler handler) {
+    Receiver(channel).SetHandler(std::move(handler));
+  }
+  void OnLost(const std::string& channel, StreamReceiver::LostHandler handler) {
+    Receiver(channel).SetLostHandler(std::move(handler));
+  }
+  // Of a channel never subscribed: all zero.
+  StreamStanding Standing(const std::string& channel) const {
+    const auto found = receivers_.find(channel);
+    return found != receivers_.end() ? found->second->standing() : StreamStanding{};
+  }
   // A message that the sender has announced is still to come, or to be given up. False for a channel never
   // subscribed.
   template <typename Message>

@@ -21,6 +21,13 @@ StreamSender::StreamSender(Bus& bus, std::string sender, const StreamOptions& op
   ScheduleStatus(0);
 }
 
+StreamSender::~StreamSender() {
+  bus_.Cancel(status_timer_);
+  if (!histories_.empty()) {
+    SendStatus();
+  }
+}
+
 Status StreamSender::Publish(const std::string& channel, Bytes message) {
   RETURN_IF_ERROR(CheckPublish(channel, message));
   History& history = histories_[channel];

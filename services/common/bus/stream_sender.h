@@ -19,6 +19,11 @@ class StreamSender {
  public:
   StreamSender(Bus& bus, std::string sender, const StreamOptions& options, StreamCounters& counters);
 
+  StreamSender(const StreamSender&) = delete;
+  StreamSender& operator=(const StreamSender&) = delete;
+  // Says a last time what was sent, so that a receiver notices a loss at the end.
+  ~StreamSender();
+
   std::int64_t session() const { return session_; }
   // Announces the channel before its first message, so that receivers know its beginning.
   void Advertise(const std::string& channel) { histories_[channel]; }

@@ -21,6 +21,12 @@ int OpenSignals() {
   return signalfd(-1, &signals, SFD_CLOEXEC | SFD_NONBLOCK);
 }
 
+// A second signal while the service ends its work is another call, not an endless one.
+void TakeSignal(int signals) {
+  signalfd_siginfo taken{};
+  [[maybe_unused]] const ssize_t bytes = read(signals, &taken, sizeof taken);
+}
+
 void WarnOfSmallBuffer(const BusHealth& health) {
   if (health.receive_buffer_bytes < kWantedReceiveBufferBytes) {
     spdlog::warn(
@@ -38,8 +44,12 @@ Status Run(const std::string& name, const std::string& folder, const ServiceFact
   WarnOfSmallBuffer(bus->Health());
   StreamHub hub(*bus, name);
   ServiceMonitor monitor(hub, name, station.file.hash());
-  bus->Watch(signals, [&bus] { bus->Stop(); });
-  ASSIGN_OR_RETURN(const std::shared_ptr<void> service, factory({station, *bus, hub, monitor}));
+  std::function<void()> stop = [&bus] { bus->Stop(); };
+  bus->Watch(signals, [&stop, signals] {
+    TakeSignal(signals);
+    stop();
+  });
+  ASSIGN_OR_RETURN(const std::shared_ptr<void> service, factory({station, *bus, hub, monitor, stop}));
   spdlog::info("running on station {}", station.name);
   const Status status = bus->Run();
   monitor.SetState(ServiceState::kStopping, "stopping");

@@ -16,6 +16,9 @@ struct ServiceContext {
   LcmBus& bus;
   StreamHub& hub;
   ServiceMonitor& monitor;
+  // Called at SIGINT or SIGTERM. Stops the bus unless the factory puts something in its place that does so
+  // before long: a service that has work to end first.
+  std::function<void()>& stop;
 };
 
 // Makes the service on its concrete drivers; what it returns lives until the service stops.
