@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "services/common/bus/channel_list.h"
+#include "services/common/bus/channels.h"
 #include "services/common/bus/stream_header.h"
 #include "tools/forgescan/replay/message_text.h"
 #include "tools/forgescan/replay/replay_network.h"
