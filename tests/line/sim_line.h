@@ -55,6 +55,10 @@ class SimLine {
   // files.
   static Result<std::unique_ptr<SimLine>> Create(RenderedCell& cell, int parts, int first_part = 1);
 
+  SimLine(const SimLine&) = delete;
+  SimLine& operator=(const SimLine&) = delete;
+  ~SimLine();  // and of its recordings
+
   void SetBusFaults(const SimFaults& faults) { network_.SetFaults(faults); }
   void LoseFrame(const LostFrame& frame) { lost_frame_ = frame; }
   RobotSim& robot() { return robot_; }
@@ -113,6 +117,7 @@ class SimLine {
   std::unique_ptr<ModelEvaluator> evaluator_;
   std::shared_ptr<ReportService> report_service_;  // after the evaluator: it goes first
   std::unique_ptr<RecorderService> recorder_service_;
+  std::string recordings_;
 
   std::vector<fsmsg::view_captured_t> views_;
   std::vector<fsmsg::scan_complete_t> scans_;
