@@ -55,7 +55,7 @@ void RecorderService::Perform(const OpenRecording& open) {
   writer_.Open(open.file, store_.PathOf(file.name), OpeningEvent(open), station_.files);
 }
 
-// A sender that was there before the recorder may have spoken of the part before it was heard.
+// A sender that was there before the recorder may have spoken before it was heard.
 void RecorderService::AddUnheard(const OpenFile& file, std::vector<fsmsg::recording_gap_t>& gaps) const {
   for (const char* channel : file.unheard) {
     const StreamStanding standing = hub_.Standing(channel);
@@ -80,9 +80,7 @@ void RecorderService::Perform(const CloseRecording& close) {
   closed.verdict = close.verdict;
   closed.reason = close.reason;
   closed.gaps = close.gaps;
-  if (close.part.has_value()) {
-    AddUnheard(found->second, closed.gaps);
-  }
+  AddUnheard(found->second, closed.gaps);
   RecordingName name = found->second.name;
   name.verdict = close.verdict;
   files_.erase(found);
@@ -117,7 +115,7 @@ std::int64_t RecorderService::SettledUs() const {
   std::int64_t settled_us = std::numeric_limits<std::int64_t>::max();
   for (const ChannelInfo& channel : channels_) {
     const StreamStanding standing = hub_.Standing(channel.name);
-    if (standing.waiting) {
+    if (standing.waiting()) {
       return 0;
     }
     const bool silent = Now() - standing.heard_us > StreamOptions{}.give_up_us;

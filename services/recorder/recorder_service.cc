@@ -42,10 +42,24 @@ RecorderService::~RecorderService() {
   for (const Bus::TimerId timer : timers_) {
     hub_.bus().Cancel(timer);
   }
+  GiveUpWhatIsMissing();
   PerformAll(machine_.OnStop(Now(), SettledUs()));
   writer_.Drain();
   for (const WriterReport& report : writer_.TakeReports()) {
     Take(report);
+  }
+}
+
+void RecorderService::GiveUpWhatIsMissing() {
+  for (const ChannelInfo& channel : channels_) {
+    const StreamStanding standing = hub_.Standing(channel.name);
+    if (standing.waiting()) {
+      fsmsg::recording_gap_t gap = GapOf(channel.name, "had not come when the recorder was stopped");
+      gap.session = standing.session;
+      gap.first_sequence = standing.next;
+      gap.last_sequence = standing.announced;
+      machine_.OnLost(gap);
+    }
   }
 }
 

@@ -49,6 +49,7 @@ class RecorderService {
   std::int64_t Now() const { return hub_.bus().NowUs(); }
   void Begin();
   void ReportLeftovers();
+  void GiveUpWhatIsMissing();
   void Subscribe(const ChannelInfo& channel);
   void OnStream(const ChannelInfo& channel, ByteView bytes);
   void OnState(const ChannelInfo& channel, ByteView bytes);

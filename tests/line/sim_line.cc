@@ -33,7 +33,15 @@ LineSimConfig LineOf(int parts, int first_part) {
   return config;
 }
 
-std::string RecordingsOf(const RenderedCell& cell) { return (cell.folder() / "recordings").string(); }
+// A folder of its own for every line.
+std::filesystem::path MakeRecordings(const RenderedCell& cell) {
+  int line = 0;
+  std::filesystem::path folder;
+  do {
+    folder = cell.folder() / ("recordings-" + std::to_string(++line));
+  } while (!std::filesystem::create_directory(folder));
+  return folder;
+}
 
 }  // namespace
 
@@ -112,9 +120,7 @@ Status SimLine::MakeComputeServices(const Station& station) {
 
 Status SimLine::MakeRecorder(const Station& station) {
   ASSIGN_OR_RETURN(RecorderConfig config, RecorderConfig::Load(station.file.Table("recorder")));
-  config.folder = RecordingsOf(cell_);
-  std::error_code ignored;  // there may be none
-  std::filesystem::remove_all(config.folder, ignored);
+  config.folder = recordings_ = MakeRecordings(cell_);
   ASSIGN_OR_RETURN(std::vector<StationFile> files, StationFilesOf(station));
   ASSIGN_OR_RETURN(recorder_service_,
                    RecorderService::Create(At("recorder").hub, At("recorder").monitor, config,
@@ -125,7 +131,13 @@ Status SimLine::MakeRecorder(const Station& station) {
 
 std::string SimLine::StopRecording() {
   recorder_service_.reset();
-  return RecordingsOf(cell_);
+  return recordings_;
+}
+
+SimLine::~SimLine() {
+  recorder_service_.reset();
+  std::error_code ignored;
+  std::filesystem::remove_all(recordings_, ignored);
 }
 
 void SimLine::Observe() {

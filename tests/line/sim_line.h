@@ -50,6 +50,10 @@ class SimLine {
   // files.
   static Result<std::unique_ptr<SimLine>> Create(RenderedCell& cell, int parts, int first_part = 1);
 
+  SimLine(const SimLine&) = delete;
+  SimLine& operator=(const SimLine&) = delete;
+  ~SimLine();  // and of its recordings
+
   void SetBusFaults(const SimFaults& faults) { network_.SetFaults(faults); }
   void LoseFrame(const LostFrame& frame) { lost_frame_ = frame; }
   RobotSim& robot() { return robot_; }
@@ -103,6 +107,7 @@ class SimLine {
   std::array<std::unique_ptr<CameraService>, 2> camera_services_;
   std::vector<std::shared_ptr<void>> compute_services_;  // reconstruction, fusion, registration, report
   std::unique_ptr<RecorderService> recorder_service_;
+  std::string recordings_;
 
   std::vector<fsmsg::view_captured_t> views_;
   std::vector<fsmsg::scan_complete_t> scans_;

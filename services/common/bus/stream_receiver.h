@@ -24,10 +24,12 @@ namespace forgescan {
 struct StreamStanding {
   std::int64_t session = 0;         // of the sender; 0 = no contact yet
   std::int64_t joined_session = 0;  // the first one heard
-  std::int64_t joined_at = 0;       // its first message that can be delivered; what it sent before was not heard
-  std::int64_t heard_us = 0;        // last sign of life of the sender
-  std::int64_t told_us = 0;         // last time it said what it had sent
-  bool waiting = false;             // an announced message is still to come, or to be given up
+  std::int64_t joined_at = 0;  // its first message that can be delivered; what it sent before was not heard
+  std::int64_t heard_us = 0;   // last sign of life of the sender
+  std::int64_t told_us = 0;    // last time it said what it had sent
+  std::int64_t next = 1;       // sequence to be delivered next
+  std::int64_t announced = 0;  // last sequence known to have been sent and not delivered; 0 = none
+  bool waiting() const { return announced != 0; }
 };
 
 class StreamReceiver {
@@ -49,7 +51,8 @@ class StreamReceiver {
   bool waiting() const { return !waiting_.empty(); }
   // In the lost handler `session` is that of the hole.
   StreamStanding standing() const {
-    return {session_, joined_session_, joined_at_, heard_us_, told_us_, waiting()};
+    const std::int64_t announced = waiting_.empty() ? 0 : waiting_.rbegin()->first;
+    return {session_, joined_session_, joined_at_, heard_us_, told_us_, next_, announced};
   }
 
  private:

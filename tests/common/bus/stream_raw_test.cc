@@ -126,7 +126,10 @@ TEST_F(StreamRawTest, ASendersLastWordNamesItsLastMessage) {
   network_.SetFaults({});
   sender.reset();
   network_.RunFor(10'000);  // less than its next regular word would have taken
-  EXPECT_TRUE(receiver_.Standing(kExposure.name).waiting);
+  const StreamStanding standing = receiver_.Standing(kExposure.name);
+  EXPECT_TRUE(standing.waiting());
+  EXPECT_EQ(standing.next, 2);
+  EXPECT_EQ(standing.announced, 2);
 }
 
 }  // namespace
