@@ -16,5 +16,6 @@ void AddStationCommand(CLI::App& app, Status& outcome);
 void AddInspectCommand(CLI::App& app, Status& outcome);
 void AddReplayCommand(CLI::App& app, Status& outcome);
 void AddPlayCommand(CLI::App& app, Status& outcome);
+void AddLogCommand(CLI::App& app, Status& outcome);
 
 }  // namespace forgescan
