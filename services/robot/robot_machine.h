@@ -72,8 +72,14 @@ class RobotMachine {
   RobotPhase phase() const { return phase_; }
   std::int32_t part() const { return scanning() ? part_ : 0; }
   std::int32_t view() const { return view_; }
-  std::string Text() const;  // what it is doing, one line
+  std::int32_t captured() const { return captured_; }  // views of the part, so far
+  std::string Text() const;                            // what it is doing, one line
 
+  // Before the first event: this part was taken up by the service before this one, and is not again while it
+  // stays in place.
+  void Remember(std::int32_t part) { last_part_ = part; }
+  // Ends the scan that is under way, as the service stops.
+  Actions OnStop(std::int64_t now_us);
   Actions OnLink(bool up, std::int64_t now_us);
   Actions OnPath(const RobotPath& path);
   Actions OnStatus(const RobotStatus& status);
