@@ -9,7 +9,7 @@
 #include <fstream>
 #include <map>
 
-#include "tools/forgescan/log/base64.h"
+#include "services/common/base64.h"
 
 namespace forgescan {
 namespace {

@@ -5,7 +5,7 @@
 #include <bit>
 #include <cstring>
 
-#include "tools/forgescan/log/base64.h"
+#include "services/common/base64.h"
 
 namespace forgescan {
 namespace {

@@ -1,10 +1,10 @@
-#include "tools/forgescan/log/base64.h"
+#include "services/common/base64.h"
 
 #include <algorithm>
 
 namespace forgescan {
 
-std::string Base64(ByteView bytes) {
+std::string Base64(std::span<const std::uint8_t> bytes) {
   constexpr char kLetters[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
   std::string text((bytes.size() + 2) / 3 * 4, '=');
   for (std::size_t from = 0, to = 0; from < bytes.size(); from += 3, to += 4) {
