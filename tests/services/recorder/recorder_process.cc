@@ -16,6 +16,10 @@ namespace fs = std::filesystem;
 
 constexpr double kStartPatience_s = 20;
 
+std::string Url(int receive_buffer_bytes) {
+  return fmt::format("udpm://239.255.76.67:7667?ttl=0&recv_buf_size={}", receive_buffer_bytes);
+}
+
 }  // namespace
 
 void RecorderProcess::SetUp() {
@@ -29,6 +33,10 @@ void RecorderProcess::TearDown() {
     kill(pid_, SIGKILL);
     WaitForEnd();
   }
+  for (const pid_t other : others_) {
+    kill(other, SIGKILL);
+    waitpid(other, nullptr, 0);
+  }
   hub_.reset();
   bus_.reset();
   if (!HasFailure()) {
@@ -37,8 +45,7 @@ void RecorderProcess::TearDown() {
 }
 
 void RecorderProcess::MakeStation(int receive_buffer_bytes, const std::string& recorder_keys) {
-  const std::string url =
-      fmt::format("udpm://239.255.76.67:7667?ttl=0&recv_buf_size={}", receive_buffer_bytes);
+  const std::string url = Url(receive_buffer_bytes);
   std::ofstream(base_ / "station/station.toml")
       << "[station]\nname = \"test\"\nbus = \"" << url << "\"\ncan = \"udp:239.74.163.2:43113\"\n"
       << "calibration = \"stereo.yaml\"\npattern = \"pattern.toml\"\nviews = \"views.toml\"\n"
@@ -82,6 +89,34 @@ void RecorderProcess::Start(rlim_t file_bytes) {
   if (hub_ == nullptr) {  // the recorder is there first, as in a station
     hub_ = std::make_unique<StreamHub>(*bus_, "line");
   }
+}
+
+void RecorderProcess::StartBusyProcess() {
+  const pid_t pid = fork();
+  if (pid == 0) {
+    prctl(PR_SET_PDEATHSIG, SIGKILL);
+    for (volatile unsigned turn = 0;; turn = turn + 1) {
+    }
+  }
+  ASSERT_GT(pid, 0);
+  others_.push_back(pid);
+}
+
+void RecorderProcess::StartFrameSubscriber(int receive_buffer_bytes) {
+  const pid_t pid = fork();
+  if (pid == 0) {
+    prctl(PR_SET_PDEATHSIG, SIGKILL);
+    const auto bus = LcmBus::Open(Url(receive_buffer_bytes));
+    if (!bus.ok()) {
+      _exit(1);
+    }
+    StreamHub hub(**bus, "subscriber");
+    hub.SubscribeRaw(kFrameLeft.name, [](ByteView) {});
+    hub.SubscribeRaw(kFrameRight.name, [](ByteView) {});
+    _exit((*bus)->Run().ok() ? 0 : 1);
+  }
+  ASSERT_GT(pid, 0);
+  others_.push_back(pid);
 }
 
 void RecorderProcess::Signal(int signal) const { ASSERT_EQ(kill(pid_, signal), 0); }

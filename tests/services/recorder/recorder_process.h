@@ -33,6 +33,10 @@ class RecorderProcess : public ::testing::Test {
   // Lifts or sets the limit of the size of its files.
   void LimitFiles(rlim_t bytes) const;
 
+  // Processes of their own, to be started before the bus is opened; they end with the test.
+  void StartBusyProcess();
+  void StartFrameSubscriber(int receive_buffer_bytes);
+
   bool RunUntil(const std::function<bool()>& condition, double seconds);
   void Run(double seconds);
   std::int64_t Counter(const std::string& name) const;
@@ -45,6 +49,7 @@ class RecorderProcess : public ::testing::Test {
   std::optional<fsmsg::service_state_t> service_;  // the recorder's last words
   std::optional<fsmsg::recorder_state_t> recorder_;
   pid_t pid_ = -1;
+  std::vector<pid_t> others_;
 };
 
 }  // namespace forgescan::testing

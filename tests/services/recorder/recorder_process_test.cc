@@ -159,6 +159,34 @@ TEST_F(RecorderProcess, HeldStillForSecondsItMissesNothing) {
   ExpectWhole(Recordings(), 7, line);
 }
 
+// As on the line: a frame of one camera every 43.2 ms.
+TEST_F(RecorderProcess, AtFullRateAmongOtherSubscribersAndBusyProcessesItMissesNothing) {
+  constexpr std::int64_t kFramePeriodUs = 43'200;
+  constexpr int kViews = 6;
+  for (int i = 0; i < 3; ++i) {
+    StartFrameSubscriber(kLargeBuffer);
+  }
+  StartBusyProcess();
+  StartBusyProcess();
+  MakeStation(kLargeBuffer);
+  Start();
+  LineScript line(*hub_, kImage);
+  std::size_t said = 0;
+  std::int64_t due_us = bus_->NowUs();
+  line.Part(7, kViews, [&] {
+    const bool frame = line.said().size() > said && line.said().back().channel.starts_with("FRAME");
+    said = line.said().size();
+    due_us = std::max(due_us, bus_->NowUs()) + (frame ? kFramePeriodUs : 0);
+    RunUntil([&] { return bus_->NowUs() >= due_us; }, 1);
+  });
+  ASSERT_TRUE(RunUntil([this] { return Counter("parts_complete") == 1; }, kPatience_s));
+  EXPECT_EQ(service_->messages_missing, 0);
+  RecordProperty("recovered", static_cast<int>(service_->messages_recovered));
+  Signal(SIGTERM);
+  EXPECT_EQ(WaitForEnd(), 0);
+  ExpectWhole(Recordings(), 7, line);
+}
+
 TEST_F(RecorderProcess, AFileOfTheStationThatIsTooLargeIsRefusedAtTheStart) {
   MakeStation(kLargeBuffer);
   fs::resize_file(base_ / "station/a.bundle", 60'000'001);
