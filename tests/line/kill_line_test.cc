@@ -68,7 +68,7 @@ class KillLine : public ::testing::Test {
   // Runs the line and kills on the way. `kills` in their order.
   void Run(int parts, const std::vector<Kill>& kills) {
     Background inspect({"forgescan", "inspect", "--scale-divisor", "4", "--parts", std::to_string(parts),
-                        "--takt", "20", "--patience", std::to_string(kPartPatienceS), "--station",
+                        "--takt", "30", "--patience", std::to_string(kPartPatienceS), "--station",
                         (folder_ / "station").string(), "--out", (folder_ / "runs").string()},
                        folder_ / "inspect.txt");
     std::size_t lines_at_kill = 0;
@@ -173,14 +173,14 @@ class KillLine : public ::testing::Test {
 };
 
 TEST_F(KillLine, RandomKillsLeaveNoPartWithoutVerdictAndNoneWithAWrongOne) {
-  const int count = FromEnvironment("FORGESCAN_KILLS", 3);
+  const int count = FromEnvironment("FORGESCAN_KILLS", 4);
   std::mt19937 random(static_cast<unsigned>(FromEnvironment("FORGESCAN_KILL_SEED", 7)));
   std::vector<Kill> kills;
   for (int i = 0; i < count; ++i) {
     const auto service = std::uniform_int_distribution<std::size_t>(0, kServiceNames.size() - 1)(random);
     kills.push_back({kServiceNames[service], std::uniform_int_distribution<int>(4, 18)(random), ""});
   }
-  const int parts = 2 + count / 2;  // about 25 lines a part
+  const int parts = 1 + count * 11 / 25;  // 11 lines from kill to kill, about 25 a part
   Run(parts, kills);
   const int not_inspected = JudgeVerdicts(parts);
   JudgeRestarts();
