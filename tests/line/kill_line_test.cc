@@ -68,7 +68,7 @@ class KillLine : public ::testing::Test {
   // Runs the line and kills on the way. `kills` in their order.
   void Run(int parts, const std::vector<Kill>& kills) {
     Background inspect({"forgescan", "inspect", "--scale-divisor", "4", "--parts", std::to_string(parts),
-                        "--takt", "20", "--patience", std::to_string(kPartPatienceS), "--station",
+                        "--takt", "30", "--patience", std::to_string(kPartPatienceS), "--station",
                         (folder_ / "station").string(), "--out", (folder_ / "runs").string()},
                        folder_ / "inspect.txt");
     std::size_t lines_at_kill = 0;
@@ -78,15 +78,27 @@ class KillLine : public ::testing::Test {
       const std::vector<std::string> lines = Progress(inspect.Text());
       const bool due =
           next != kills.end() && lines.size() > lines_at_kill && IsDue(*next, lines, lines_at_kill);
-      const pid_t pid = due ? PidOfService(Station(), next->service) : 0;
-      if (pid > 0 && kill(pid, SIGKILL) == 0) {
-        killed_.push_back(next->service);
+      if (due && Strike(inspect, next->service)) {
         std::printf("killed %-15s after: %s\n", next->service.c_str(), lines.back().c_str());
         lines_at_kill = lines.size();
         ++next;
       }
     }
+    exit_code_ = inspect.Wait(0);
     text_ = inspect.Text();
+  }
+  // False if it does not run at the moment. No service: the whole line is told to stop.
+  bool Strike(const Background& inspect, const std::string& service) {
+    if (service.empty()) {
+      inspect.Signal(SIGTERM);
+      return true;
+    }
+    const pid_t pid = PidOfService(Station(), service);
+    if (pid <= 0 || kill(pid, SIGKILL) != 0) {
+      return false;
+    }
+    killed_.push_back(service);
+    return true;
   }
   static bool IsDue(const Kill& kill, const std::vector<std::string>& lines, std::size_t since) {
     if (kill.after.empty()) {
@@ -170,17 +182,50 @@ class KillLine : public ::testing::Test {
   fs::path folder_;
   std::vector<std::string> killed_;
   std::string text_;
+  int exit_code_ = -1;
 };
 
+// What the report service has written of the one part.
+Json ReportOf(const fs::path& station) {
+  for (const auto& entry : fs::directory_iterator(station / "results")) {
+    if (fs::exists(entry.path() / "report.json")) {
+      EXPECT_TRUE(fs::exists(entry.path() / "report.html"));
+      return Json::parse(ReadAll(entry.path() / "report.json"));
+    }
+  }
+  return Json();
+}
+
+TEST_F(KillLine, AStoppedLineStillJudgesThePartInWork) {
+  Run(1, {{"", 0, "scan complete"}});
+  EXPECT_EQ(exit_code_, 1);
+  EXPECT_NE(text_.find("interrupted"), std::string::npos) << text_;
+  const Json report = ReportOf(Station());
+  ASSERT_FALSE(report.is_null()) << text_;
+  EXPECT_EQ(report["verdict"], "OK") << report.dump(1);
+  const std::string log = ReadAll(Station() / "log/supervisor.log");
+  EXPECT_NE(log.find("station: is down, 0 restarts"), std::string::npos) << log;
+  EXPECT_EQ(log.find("KILLED"), std::string::npos) << log;
+  EXPECT_EQ(log.find("still in work"), std::string::npos) << log;
+}
+
+TEST_F(KillLine, AScanThatIsStoppedEndsByName) {
+  Run(1, {{"", 0, "view 2 captured"}});
+  const Json report = ReportOf(Station());
+  ASSERT_FALSE(report.is_null()) << text_;
+  EXPECT_EQ(report["verdict"], "NOT_INSPECTED");
+  EXPECT_NE(report.dump().find("the robot service was stopped"), std::string::npos) << report.dump(1);
+}
+
 TEST_F(KillLine, RandomKillsLeaveNoPartWithoutVerdictAndNoneWithAWrongOne) {
-  const int count = FromEnvironment("FORGESCAN_KILLS", 3);
+  const int count = FromEnvironment("FORGESCAN_KILLS", 4);
   std::mt19937 random(static_cast<unsigned>(FromEnvironment("FORGESCAN_KILL_SEED", 7)));
   std::vector<Kill> kills;
   for (int i = 0; i < count; ++i) {
     const auto service = std::uniform_int_distribution<std::size_t>(0, kServiceNames.size() - 1)(random);
     kills.push_back({kServiceNames[service], std::uniform_int_distribution<int>(4, 18)(random), ""});
   }
-  const int parts = 2 + count / 2;  // about 25 lines a part
+  const int parts = 1 + count * 11 / 25;  // 11 lines from kill to kill, about 25 a part
   Run(parts, kills);
   const int not_inspected = JudgeVerdicts(parts);
   JudgeRestarts();

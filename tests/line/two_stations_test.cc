@@ -15,6 +15,7 @@
 #include "services/common/bus/stream_hub.h"
 #include "services/common/service/station.h"
 #include "tests/line/prepared_station.h"
+#include "tools/forgescan/station/station_services.h"
 
 namespace forgescan::testing {
 namespace {
@@ -98,8 +99,8 @@ class TwoStations : public ::testing::Test {
           base_ / (std::string(kName[i]) + ".txt"));
     }
     ASSERT_TRUE(RunUntil([&] {
-      return ears_[0]->sessions.size() == kServiceNames.size() &&
-             ears_[1]->sessions.size() == kServiceNames.size();
+      return ears_[0]->sessions.size() == StationServices().size() &&
+             ears_[1]->sessions.size() == StationServices().size();
     })) << LogOf(0)
         << LogOf(1);
   }
@@ -126,7 +127,7 @@ TEST_F(TwoStations, HearNothingOfEachOther) {
   const auto status =
       Call(std::string(FORGESCAN_BIN_DIR) + "/forgescan station status --json " + Folder(0).string());
   EXPECT_NE(status.exit_code, 0) << "there are no devices";
-  const auto json = nlohmann::json::parse(status.text.substr(0, status.text.rfind("}") + 1), nullptr, false);
+  const auto json = nlohmann::json::parse(status.text.substr(status.text.find("{\n")), nullptr, false);
   ASSERT_FALSE(json.is_discarded()) << status.text;
   EXPECT_EQ(json["report"]["state"], "READY");
   EXPECT_EQ(json["robot"]["state"], "ERROR");

@@ -15,6 +15,7 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 
 namespace forgescan {
@@ -179,6 +180,12 @@ Status EnterPrivateNetwork(const std::vector<std::string>& groups) {
 
 Status JoinNetworkOf(int pid) {
   const std::string base = "/proc/" + std::to_string(pid) + "/ns/";
+  std::error_code not_running;
+  if (std::filesystem::read_symlink(base + "net", not_running) ==
+          std::filesystem::read_symlink("/proc/self/ns/net", not_running) &&
+      !not_running) {
+    return {};
+  }
   for (const auto& [kind, flag] : {std::pair{"user", CLONE_NEWUSER}, std::pair{"net", CLONE_NEWNET}}) {
     const int fd = open((base + kind).c_str(), O_RDONLY | O_CLOEXEC);
     if (fd < 0) {

@@ -27,7 +27,8 @@ Status EnsureNetwork(const std::string& folder);
 // kUnavailable (the kernel does not allow it).
 Status EnterPrivateNetwork(const std::vector<std::string>& groups);
 
-// Moves this process into the network namespace of another one. Errors: kUnavailable, kNotFound.
+// Moves this process into the network namespace of another one, if it is not there. Errors: kUnavailable,
+// kNotFound.
 Status JoinNetworkOf(int pid);
 
 }  // namespace forgescan

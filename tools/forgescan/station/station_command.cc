@@ -93,9 +93,7 @@ Status Down(const StationOptions& options) {
 Status ShowStatus(const StationOptions& options) {
   ASSIGN_OR_RETURN(const StationProcesses running, RunningStation(options.folder));
   ASSIGN_OR_RETURN(const Station station, Station::Load(options.folder));
-  if (!HasMulticastRoute(GroupsOf(station))) {
-    RETURN_IF_ERROR(JoinNetworkOf(running.pid));
-  }
+  RETURN_IF_ERROR(JoinNetworkOf(running.pid));
   ASSIGN_OR_RETURN(const auto bus, LcmBus::Open(station.bus_url));
   const StateTable table(*bus);
   ProcessUsage usage;

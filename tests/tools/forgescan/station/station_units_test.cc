@@ -11,6 +11,8 @@
 #include <fstream>
 #include <map>
 
+#include "tools/forgescan/station/station_services.h"
+
 namespace forgescan {
 namespace {
 
@@ -36,7 +38,7 @@ std::map<std::string, std::string> TextsOf(const std::string& can_url) {
 
 TEST(StationUnits, OneAServiceATargetAndARoute) {
   const auto texts = TextsOf("socketcan:can0");
-  EXPECT_EQ(texts.size(), 2 + kServiceNames.size());
+  EXPECT_EQ(texts.size(), 2 + StationServices().size());
   const std::string robot = texts.at("forgescan-cell-1-robot.service");
   EXPECT_THAT(robot, HasSubstr("ExecStart=/opt/forgescan/bin/forgescan-robot --station /srv/cell-1\n"));
   EXPECT_THAT(robot, HasSubstr("Type=notify\n"));
