@@ -8,6 +8,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "services/common/bus/channel.h"
 #include "services/common/bus/codec.h"
@@ -80,6 +81,7 @@ class StreamHub {
 
  private:
   StreamReceiver& Receiver(const std::string& channel);
+  void Hear(const std::string& channel, Bus::MessageHandler handler);
 
   Bus& bus_;
   StreamOptions options_;
@@ -87,6 +89,7 @@ class StreamHub {
   StreamSender sender_;
   std::map<std::string, std::unique_ptr<StreamReceiver>> receivers_;
   Bus::TimerId timer_;
+  std::vector<Bus::SubscriptionId> subscriptions_;
 };
 
 // Periodic state, where only the newest message counts: no sequence, no resend.
@@ -96,9 +99,9 @@ Status PublishState(Bus& bus, const StateChannel<Message>& channel, const Messag
 }
 // What does not decode is left out: the sender says it again within a second.
 template <typename Message>
-void SubscribeState(Bus& bus, const StateChannel<Message>& channel,
-                    std::function<void(const Message&)> handler) {
-  bus.Subscribe(channel.name, [handler = std::move(handler)](ByteView bytes) {
+Bus::SubscriptionId SubscribeState(Bus& bus, const StateChannel<Message>& channel,
+                                   std::function<void(const Message&)> handler) {
+  return bus.Subscribe(channel.name, [handler = std::move(handler)](ByteView bytes) {
     if (const Result<Message> message = Decode<Message>(bytes); message.ok()) {
       handler(*message);
     }

@@ -23,6 +23,7 @@ StreamSender::StreamSender(Bus& bus, std::string sender, const StreamOptions& op
 
 StreamSender::~StreamSender() {
   bus_.Cancel(status_timer_);
+  bus_.Cancel(piece_timer_);
   if (!histories_.empty()) {
     SendStatus();
   }
@@ -128,7 +129,7 @@ void StreamSender::SendNextPiece() {
   queued_.erase(piece);
   SendPiece(piece);
   if (!queue_.empty()) {
-    bus_.At(bus_.NowUs() + options_.piece_gap_us, [this] { SendNextPiece(); });
+    piece_timer_ = bus_.At(bus_.NowUs() + options_.piece_gap_us, [this] { SendNextPiece(); });
   }
 }
 

@@ -60,6 +60,7 @@ class StreamSender {
   std::deque<Piece> queue_;
   std::set<Piece> queued_;
   Bus::TimerId status_timer_ = 0;
+  Bus::TimerId piece_timer_ = 0;
   std::int64_t status_delay_us_;
 };
 

@@ -63,11 +63,10 @@ void ReplayNetwork::Stop(const std::string& name) {
   const auto found = hosts_.find(name);
   SimBus& bus = found->second->bus;
   muted_ = !found->second->recorded_stopping;
-  found->second->service.reset();
-  network_.RunFor(0);  // what it said last
-  muted_ = false;
   hosts_.erase(found);
   network_.RemoveNode(bus);
+  network_.RunFor(0);  // what it said last
+  muted_ = false;
 }
 
 Status ReplayNetwork::OnRecordedState(const fsmsg::service_state_t& state) {
