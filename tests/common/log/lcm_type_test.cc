@@ -127,6 +127,22 @@ TEST(LcmType, RefusesWhatIsNoDefinition) {
   EXPECT_TRUE(LcmTypes::Parse("struct a_t { int8_t v; } // no end of line").ok());
 }
 
+TEST(LcmType, BoundsWhatATextCanDemand) {
+  std::string doubling = "struct t0 { int8_t x; } ", chain = "struct t0 { int8_t x; } ";
+  for (int i = 1; i < 40; ++i) {
+    doubling += fmt::format("struct t{} {{ t{} a, b; }} ", i, i - 1);
+  }
+  for (int i = 1; i < 60; ++i) {
+    chain += fmt::format("struct t{} {{ t{} a; }} ", i, i - 1);
+  }
+  for (const std::string& text : {doubling, chain}) {
+    const auto types = LcmTypes::Parse(text);
+    ASSERT_FALSE(types.ok());
+    EXPECT_THAT(types.error().message,
+                HasSubstr("contains more than 5000 structs, or structs more than 32 deep"));
+  }
+}
+
 TEST(LcmType, KnowsStreams) {
   const LcmTypes types = OurTypes();
   EXPECT_TRUE(types.Find("fsmsg.frame_t")->IsStream());
@@ -223,6 +239,10 @@ TEST(LcmDecode, RefusesWhatTheGeneratedCodeRefuses) {
   Bytes longer = whole;
   longer.push_back(0);
   EXPECT_THAT(DecodeToJson(types, longer).error().message, HasSubstr("1 bytes too many"));
+  EXPECT_THAT(
+      DecodeToJson(types, ByteView(whole).first(whole.size() - 1)).error().message,
+      HasSubstr(
+          "do not decode as fsmsg.verdict_t: dimensions.reason is a string of 1 bytes, and 0 are left"));
   EXPECT_TRUE(DecodeToJson(types, whole).ok());  // works again
 }
 
