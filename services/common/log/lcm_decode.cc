@@ -10,8 +10,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr int kMaxDepth = 32;  // structs within structs; a type may contain itself
-
 class Decoder {
  public:
   Decoder(const LcmTypes& types, ByteView rest) : types_(types), rest_(rest) {}
@@ -19,9 +17,10 @@ class Decoder {
   bool at_end() const { return rest_.empty(); }
   std::size_t left() const { return rest_.size(); }
 
-  Result<Json> Struct(const LcmStruct& type, int depth) {
-    if (depth > kMaxDepth) {
-      return Fail(ErrorCode::kFormat, "{} contains more than {} structs in each other", type.name, kMaxDepth);
+  Result<Json> Struct(const LcmStruct& type, std::size_t depth) {
+    if (depth > kMaxLcmDepth) {  // a type may contain itself
+      return Fail(ErrorCode::kFormat, "{} contains more than {} structs in each other", type.name,
+                  kMaxLcmDepth);
     }
     Json object = Json::object();
     std::vector<std::int64_t> integers(type.fields.size());  // for the sizes of later fields
@@ -33,7 +32,8 @@ class Decoder {
       }
       auto value = Array(field, sizes, depth);
       if (!value.ok()) {
-        return Fail(ErrorCode::kFormat, "{}.{}", field.name, value.error().message);
+        const bool is_own = value.error().message.starts_with(' ');  // else of a field of a struct within
+        return Fail(ErrorCode::kFormat, "{}{}{}", field.name, is_own ? "" : ".", value.error().message);
       }
       if (value->is_number_integer()) {
         integers[i] = value->get<std::int64_t>();
@@ -44,7 +44,7 @@ class Decoder {
   }
 
  private:
-  Result<Json> Array(const LcmField& field, std::span<const std::int64_t> sizes, int depth) {
+  Result<Json> Array(const LcmField& field, std::span<const std::int64_t> sizes, std::size_t depth) {
     if (sizes.empty()) {
       return One(field, depth);
     }
@@ -64,7 +64,7 @@ class Decoder {
     return array;
   }
 
-  Result<Json> One(const LcmField& field, int depth) {
+  Result<Json> One(const LcmField& field, std::size_t depth) {
     if (!field.primitive) {
       return Struct(*types_.Find(field.type), depth + 1);
     }

@@ -39,6 +39,39 @@ std::uint64_t HashOfOwnFields(const LcmStruct& type) {
   return hash;
 }
 
+// Structs within structs, each as often as it occurs. Twenty types that contain each other twice are a
+// million: a text from a damaged log must not keep us busy for ever.
+constexpr int kMaxNested = 5000;
+
+// Counts `left` down for each struct within the type; negative = too many, or too deep.
+void CountNested(const LcmTypes& types, const LcmStruct& type, std::vector<const LcmStruct*>& within,
+                 int& left) {
+  if (std::find(within.begin(), within.end(), &type) != within.end()) {
+    return;
+  }
+  left = within.size() > kMaxLcmDepth ? -1 : left - 1;
+  within.push_back(&type);
+  for (const LcmField& field : type.fields) {
+    if (!field.primitive && left >= 0) {
+      CountNested(types, *types.Find(field.type), within, left);
+    }
+  }
+  within.pop_back();
+}
+
+Status CheckNesting(const LcmTypes& types) {
+  for (const LcmStruct& type : types.structs()) {
+    std::vector<const LcmStruct*> within;
+    int left = kMaxNested;
+    CountNested(types, type, within, left);
+    if (left < 0) {
+      return Fail(ErrorCode::kFormat, "{} contains more than {} structs, or structs more than {} deep",
+                  type.name, kMaxNested, kMaxLcmDepth);
+    }
+  }
+  return {};
+}
+
 }  // namespace
 
 bool LcmStruct::HasField(std::string_view field) const {
@@ -72,6 +105,7 @@ Result<LcmTypes> LcmTypes::Parse(std::string_view text) {
       }
     }
   }
+  RETURN_IF_ERROR(CheckNesting(types));
   for (std::size_t i = 0; i < types.structs_.size(); ++i) {
     types.by_fingerprint_.try_emplace(types.Fingerprint(types.structs_[i]), i);
   }

@@ -14,6 +14,9 @@
 
 namespace forgescan {
 
+// Structs within structs.
+inline constexpr std::size_t kMaxLcmDepth = 32;
+
 enum class LcmPrimitive { kInt8, kInt16, kInt32, kInt64, kByte, kFloat, kDouble, kString, kBoolean };
 
 struct LcmDimension {
@@ -53,7 +56,8 @@ Result<std::vector<LcmStruct>> ParseLcmDefinitions(std::string_view text);
 class LcmTypes {
  public:
   LcmTypes() = default;
-  // Errors: kFormat (as above; a type is unknown or defined twice).
+  // Errors: kFormat (as above; a type is unknown, defined twice, or contains more than 5000
+  // structs or more than 32 in each other).
   static Result<LcmTypes> Parse(std::string_view text);
 
   const std::vector<LcmStruct>& structs() const { return structs_; }

@@ -1,5 +1,5 @@
-// Reads an LCM event log, whole or damaged. LCM's own reader stops at the first bad byte, trusts lengths up to
-// 2 GB and takes a truncated log for a whole one; this one finds every event that is still there, and says
+// Reads an LCM event log, whole or damaged. LCM's own reader stops at the first bad byte, trusts lengths up
+// to 2 GB and takes a truncated log for a whole one; this one finds every event that is still there, and says
 // what lies between.
 //
 // Format (LCM 1.3.1): per event a header of 28 bytes, big-endian: sync word EDA1DA01, int64 event number,
@@ -21,9 +21,9 @@ namespace forgescan {
 
 // An event in the file.
 struct LogEntry {
-  std::uint64_t offset = 0;  // of its header
-  std::int64_t number = 0;   // as written
-  std::int64_t utime = 0;    // us since 1970 UTC of recording; not always in order
+  std::uint64_t offset = 0;   // of its header
+  std::int64_t number = 0;    // as written
+  std::int64_t utime = 0;     // us since 1970 UTC of recording; not always in order
   std::uint32_t channel = 0;  // index in LogReader::channels()
   std::uint32_t bytes = 0;    // of the message
 };

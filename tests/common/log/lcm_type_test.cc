@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <map>
 
 #include "fsmsg/frame_t.hpp"
 #include "fsmsg/fusion_result_t.hpp"
@@ -20,7 +21,9 @@
 #include "services/common/bus/channels.h"
 #include "services/common/bus/codec.h"
 #include "services/common/log/lcm_decode.h"
+#include "services/common/log/log_reader.h"
 #include "services/common/log/message_definitions.h"
+#include "tests/common/real_data.h"
 
 namespace forgescan {
 namespace {
@@ -127,6 +130,22 @@ TEST(LcmType, RefusesWhatIsNoDefinition) {
   EXPECT_TRUE(LcmTypes::Parse("struct a_t { int8_t v; } // no end of line").ok());
 }
 
+TEST(LcmType, BoundsWhatATextCanDemand) {
+  std::string doubling = "struct t0 { int8_t x; } ", chain = "struct t0 { int8_t x; } ";
+  for (int i = 1; i < 40; ++i) {
+    doubling += fmt::format("struct t{} {{ t{} a, b; }} ", i, i - 1);
+  }
+  for (int i = 1; i < 60; ++i) {
+    chain += fmt::format("struct t{} {{ t{} a; }} ", i, i - 1);
+  }
+  for (const std::string& text : {doubling, chain}) {
+    const auto types = LcmTypes::Parse(text);
+    ASSERT_FALSE(types.ok());
+    EXPECT_THAT(types.error().message,
+                HasSubstr("contains more than 5000 structs, or structs more than 32 deep"));
+  }
+}
+
 TEST(LcmType, KnowsStreams) {
   const LcmTypes types = OurTypes();
   EXPECT_TRUE(types.Find("fsmsg.frame_t")->IsStream());
@@ -160,6 +179,32 @@ TEST(LcmDecode, GivesTheFieldsInTheirOrder) {
   ASSERT_EQ((*json)["dimensions"].size(), 2u);
   EXPECT_EQ((*json)["dimensions"][1]["name"], "shaft");
   EXPECT_TRUE((*json)["dimensions"][1]["measured_mm"].is_null());  // NaN
+}
+
+// The fingerprints in a log of other people's programs are those of its types, and all of it decodes.
+TEST(LcmDecode, DecodesARealLog) {
+  const auto data = RealData("lcm-log");
+  if (!data) GTEST_SKIP() << "lcm-log" << kNoRealData;
+  const LcmTypes types = Types(R"(
+    struct encoders_t { int64_t utime; int32_t left_ticks_total, right_ticks_total; }
+    struct imu_t { int64_t utime; double raw_acceleration[3], raw_angular_velocity[3], raw_orientation[3]; }
+    struct laser_t { int64_t utime; int32_t num_ranges; float ranges[num_ranges], thetas[num_ranges];
+                     int64_t times[num_ranges]; float intensities[num_ranges]; }
+    struct pose_t { int64_t utime; float x, y, theta; })");
+  const std::map<std::string, std::string> type_of{{"MAEBOT_ENCODERS", "encoders_t"},
+                                                   {"MAEBOT_IMU", "imu_t"},
+                                                   {"RPLIDAR_LASER", "laser_t"},
+                                                   {"SLAM_POSE", "pose_t"}};
+  const auto log = LogReader::Open(*data / "convex.log");
+  ASSERT_TRUE(log.ok()) << log.error().message;
+  for (const LogEntry& entry : log->entries()) {
+    const auto message = log->Read(entry);
+    ASSERT_TRUE(message.ok());
+    ASSERT_EQ(types.TypeOf(*message), types.Find(type_of.at(log->ChannelOf(entry))));
+    const auto json = DecodeToJson(types, *message);
+    ASSERT_TRUE(json.ok()) << json.error().message;
+    EXPECT_GT((*json)["utime"], 0);
+  }
 }
 
 TEST(LcmDecode, KeepsBytesBinary) {
@@ -223,6 +268,10 @@ TEST(LcmDecode, RefusesWhatTheGeneratedCodeRefuses) {
   Bytes longer = whole;
   longer.push_back(0);
   EXPECT_THAT(DecodeToJson(types, longer).error().message, HasSubstr("1 bytes too many"));
+  EXPECT_THAT(
+      DecodeToJson(types, ByteView(whole).first(whole.size() - 1)).error().message,
+      HasSubstr(
+          "do not decode as fsmsg.verdict_t: dimensions.reason is a string of 1 bytes, and 0 are left"));
   EXPECT_TRUE(DecodeToJson(types, whole).ok());  // works again
 }
 

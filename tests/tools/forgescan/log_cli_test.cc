@@ -189,6 +189,11 @@ TEST_F(LogCli, CheckFindsWhatDoesNotBelong) {
   Write(recording);
   ExpectFinding("RECORDING_CLOSED: 1 events follow it");
   recording = TestRecording::Make();
+  recording.events.pop_back();
+  recording.Close({}, fsmsg::verdict_t::VERDICT_NOT_OK);
+  Write(recording);
+  ExpectFinding("RECORDING_CLOSED: says that the verdict is NOT_OK, VERDICT says OK");
+  recording = TestRecording::Make();
   recording.events[recording.Find("SERVICE_STATE")].message.push_back(0);
   recording.events[recording.Find("SERVICE_STATE", 1)].message.resize(5);
   recording.events[recording.Find("SERVICE_STATE", 2)].message[0] ^= 1;

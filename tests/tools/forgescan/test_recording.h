@@ -66,7 +66,8 @@ class TestRecording {
     events.push_back({channel, Now(), bytes});
   }
   // The closing event of what is there.
-  void Close(const std::vector<fsmsg::recording_gap_t>& gaps) {
+  void Close(const std::vector<fsmsg::recording_gap_t>& gaps,
+             std::int8_t verdict = fsmsg::verdict_t::VERDICT_OK) {
     ChannelTotals totals;
     for (const TestEvent& event : events) {
       totals.Add(event.channel, event.message);
@@ -74,7 +75,7 @@ class TestRecording {
     fsmsg::recording_closed_t closed{};
     closed.utime = Now();
     closed.part = kTestPart;
-    closed.verdict = fsmsg::verdict_t::VERDICT_OK;
+    closed.verdict = verdict;
     closed.reason = "the part was sorted";
     closed.channels = totals.Totals();
     closed.channel_count = static_cast<std::int32_t>(closed.channels.size());

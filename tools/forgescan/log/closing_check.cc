@@ -41,6 +41,11 @@ void ClosingCheck::Add(const LogEntry& entry, ByteView message, std::vector<LogF
   totals_.Add(channel, message);
   if (channel == kRecordedFile.name) {
     CheckRecordedFile(entry, message, findings);
+  } else if (channel == kVerdict.name) {
+    const auto verdict = Decode<fsmsg::verdict_t>(message);
+    if (verdict.ok()) {
+      verdicts_[verdict->part] = verdict->verdict;
+    }
   }
 }
 
@@ -126,6 +131,12 @@ void ClosingCheck::FinishClosing(const fsmsg::recording_closed_t& closed,
     findings.push_back(
         {std::nullopt, kRecordingClosed.name,
          fmt::format("closes part {}, part {} was opened", closed.part, recording_.opened->part)});
+  }
+  if (const auto verdict = verdicts_.find(closed.part);
+      verdict != verdicts_.end() && verdict->second != closed.verdict) {
+    findings.push_back({std::nullopt, kRecordingClosed.name,
+                        fmt::format("says that the verdict is {}, VERDICT says {}",
+                                    VerdictName(closed.verdict), VerdictName(verdict->second))});
   }
   for (const Difference& difference : Differences()) {
     findings.push_back({std::nullopt, difference.channel, difference.what});

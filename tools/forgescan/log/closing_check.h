@@ -1,6 +1,7 @@
 // Checks a log against what its own opening and closing events say of it.
 #pragma once
 
+#include <map>
 #include <set>
 #include <string>
 #include <vector>
@@ -36,6 +37,7 @@ class ClosingCheck {
   bool is_closed_ = false;
   std::int64_t after_closing_ = 0;  // events
   std::int64_t recorded_files_ = 0;
+  std::map<std::int32_t, std::int8_t> verdicts_;  // by part
 };
 
 }  // namespace forgescan

@@ -27,7 +27,7 @@ Result<std::int64_t> ParseTime(const std::string& text, std::int64_t begin_us) {
     if (is_relative) {
       const double us = std::stod(text.substr(1), &used) * 1e6;
       used = std::abs(us) < 1e17 ? used + 1 : 0;  // false for NaN too
-      utime = used == 0 ? 0 : begin_us + std::llround(us);
+      used = used == 0 || __builtin_add_overflow(begin_us, std::llround(us), &utime) ? 0 : used;
     } else {
       utime = std::stoll(text, &used);
     }

@@ -1,5 +1,6 @@
 #include "tools/forgescan/log/new_log.h"
 
+#include <algorithm>
 #include <filesystem>
 
 #include "fsmsg/verdict_t.hpp"
@@ -56,7 +57,20 @@ void NewLog::AddGap(const std::string& channel, const std::string& reason) {
   gaps_.push_back(gap);
 }
 
+void NewLog::AddChangedChannels() {
+  const std::vector<fsmsg::channel_total_t> copied = totals_.Totals();
+  for (const auto& said : source_.closed ? source_.closed->channels : std::vector<fsmsg::channel_total_t>()) {
+    const auto is = std::find_if(copied.begin(), copied.end(),
+                                 [&said](const auto& total) { return total.channel == said.channel; });
+    if (is != copied.end() && is->events >= said.events &&
+        (is->events != said.events || is->bytes != said.bytes || is->crc32 != said.crc32)) {
+      AddGap(said.channel, "some of the events are not what was recorded, it is not known which");
+    }
+  }
+}
+
 Status NewLog::Close(const std::string& reason) {
+  AddChangedChannels();
   fsmsg::recording_closed_t closed{};
   closed.utime = last_utime_;
   closed.part = source_.closed ? source_.closed->part : source_.opened ? source_.opened->part : -1;
