@@ -119,7 +119,7 @@ Status RecordingWriter::Begin(FileId file, const std::string& path, fsmsg::recor
   for (const fsmsg::recorded_file_t& content : read) {
     RETURN_IF_ERROR(Append(open, kRecordedFile.name, opened.utime, Encode(content)));
   }
-  return open.log.Sync();
+  return {};
 }
 
 Status RecordingWriter::Append(OpenFile& file, const char* channel, std::int64_t utime, ByteView message) {

@@ -6,6 +6,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <csignal>
 #include <fstream>
 
@@ -95,7 +96,9 @@ void RecorderProcess::StartBusyProcess() {
   const pid_t pid = fork();
   if (pid == 0) {
     prctl(PR_SET_PDEATHSIG, SIGKILL);
-    for (volatile unsigned turn = 0;; turn = turn + 1) {
+    std::atomic<unsigned> turns = 0;
+    while (true) {
+      ++turns;
     }
   }
   ASSERT_GT(pid, 0);

@@ -227,6 +227,62 @@ TEST_F(RecorderServiceTest, OneThatBeginsInTheMiddleOfAPartSaysWhatItDidNotHear)
   EXPECT_THAT(OfPart(recordings, 8)[0].closed->gaps, IsEmpty()) << "the next one is whole";
 }
 
+TEST_F(RecorderServiceTest, ASenderThatStartsAnewIsNoGapByItself) {
+  Start();
+  {
+    StreamHub first(network_.AddNode(), "line");
+    LineScript line(first, 1000);
+    line.Begin(7, Pause());
+    line.View(7, 0, Pause());
+    Run(0.1);
+  }
+  StreamHub second(network_.AddNode(), "line");
+  LineScript line(second, 1000);
+  line.View(7, 1, Pause());
+  line.End(7, Pause(), 1);
+  Run(3);
+  const auto parts = OfPart(Stop(), 7);
+  ASSERT_EQ(parts.size(), 1u);
+  EXPECT_THAT(parts[0].closed->gaps, IsEmpty());
+  EXPECT_EQ(parts[0].On("FRAME_LEFT").size(), 4u);
+}
+
+// How much is left out depends on the disk of the moment; that nothing goes unsaid does not.
+TEST_F(RecorderServiceTest, WhatTheDiskIsTooSlowForIsLeftOutByNumber) {
+  config_.backlog_mb = 100;
+  std::ofstream(base_ / "large");
+  fs::resize_file(base_ / "large", 60'000'000);
+  for (const char* name : {"a", "b", "c"}) {
+    station_.files.push_back({name, (base_ / "large").string()});
+  }
+  Start();
+  StreamHub sender(network_.AddNode(), "sender", {.history_bytes = 1, .burst_bytes = 1});
+  LineScript line(sender, 5'000'000);
+  line.Begin(7, Pause());
+  for (int view = 0; view < 10; ++view) {
+    line.View(7, view, Pause());
+  }
+  line.End(7, Pause(), 1);
+  Settle();
+  Run(3);
+  const std::int64_t dropped = monitor_.counter("messages_dropped");
+  RecordProperty("dropped", static_cast<int>(dropped));
+  const auto parts = OfPart(Stop(), 7);
+  ASSERT_EQ(parts.size(), 1u);
+  ASSERT_TRUE(parts[0].closed.has_value());
+  std::size_t admitted = 0, held = 0;
+  for (const fsmsg::recording_gap_t& gap : parts[0].closed->gaps) {
+    EXPECT_THAT(gap.reason, HasSubstr("the disk was too slow"));
+    admitted +=
+        gap.first_sequence == 0 ? 0 : static_cast<std::size_t>(gap.last_sequence - gap.first_sequence + 1);
+  }
+  for (const ChannelInfo& channel : AllChannels()) {
+    held += channel.kind == ChannelKind::kStream ? parts[0].On(channel.name).size() : 0;
+  }
+  EXPECT_EQ(held + admitted, line.SaidOf(7));
+  EXPECT_EQ(parts[0].name.complete, dropped == 0);
+}
+
 TEST_F(RecorderServiceTest, AskedToStopItWaitsForTheNewsOfASortedPart) {
   Start();
   LineScript(world_, 1000).Part(7, 1, Pause());
