@@ -177,6 +177,8 @@ class KillLine : public ::testing::Test {
       ++restarts;
     }
     EXPECT_EQ(restarts, killed_.size()) << log;
+    EXPECT_NE(log.find("station: is down"), std::string::npos) << log;
+    EXPECT_GE(exit_code_, 0) << "inspect itself was killed\n" << text_;
   }
 
   fs::path folder_;
