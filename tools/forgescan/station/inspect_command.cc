@@ -119,11 +119,9 @@ Result<fs::path> MakeRunFolder(const std::string& base) {
   return Fail(ErrorCode::kIo, "no new folder can be made in {}", base);
 }
 
-// Returns the verdicts, when the line has sorted every part.
-Result<std::vector<fsmsg::verdict_t>> InspectParts(StationRunner& runner, ProcessGroup& cell,
-                                                   const InspectOptions& options, const fs::path& run) {
-  StreamHub hub(runner.bus(), "inspect");
-  const Progress progress(hub);
+// Returns when the line has sorted every part.
+Status InspectParts(StationRunner& runner, ProcessGroup& cell, const InspectOptions& options,
+                    const fs::path& run, const Progress& progress) {
   const Interrupt interrupt;
   if (const int bytes = runner.bus().Health().receive_buffer_bytes; bytes < kWantedReceiveBufferBytes) {
     fmt::print(
@@ -155,7 +153,7 @@ Result<std::vector<fsmsg::verdict_t>> InspectParts(StationRunner& runner, Proces
   }
   fmt::print("\n{}\ninspection took {:.0f} s, {} restarts\n", runner.Table(140, false), progress.Seconds(),
              runner.restarts());
-  return progress.verdicts();
+  return {};
 }
 
 Status Prepare(const InspectOptions& options, const fs::path& run) {
@@ -184,14 +182,14 @@ Status Inspect(const InspectOptions& options) {
   RETURN_IF_ERROR(Prepare(options, run));
   ProcessGroup cell((run / "log").string());
   ASSIGN_OR_RETURN(const auto runner, StationRunner::Create((run / "station").string(), Echo::kTroubles));
-  const auto verdicts = InspectParts(*runner, cell, options, run);
+  StreamHub hub(runner->bus(), "inspect");  // listens until the bus is silent
+  const Progress progress(hub);
+  const Status inspected = InspectParts(*runner, cell, options, run, progress);
   const Status stopped = runner->Stop();  // the report service writes the pages that are still due
   cell.Stop();
-  if (!verdicts.ok()) {
-    return verdicts.error();
-  }
+  RETURN_IF_ERROR(inspected);
   RETURN_IF_ERROR(stopped);
-  return ShowOutcome(run, runner->station().results, *verdicts, options.parts);
+  return ShowOutcome(run, runner->station().results, progress.verdicts(), options.parts);
 }
 
 }  // namespace
