@@ -83,7 +83,8 @@ std::vector<std::string> FieldDifferences(const LcmTypes& types, ByteView record
                                           std::size_t limit) {
   const Result<Json> before = DecodeToJson(types, recorded), after = DecodeToJson(types, now);
   if (!before.ok() || !after.ok()) {
-    return {before.ok() ? "now: " + after.error().message : "recorded: " + before.error().message};
+    return {before.ok() ? fmt::format("now: {}", after.error().message)
+                        : fmt::format("recorded: {}", before.error().message)};
   }
   std::vector<std::string> lines;
   Compare("", *before, *after, lines);
