@@ -10,6 +10,7 @@
 #include <map>
 
 #include "services/common/base64.h"
+#include "services/common/bus/bus.h"
 
 namespace forgescan {
 namespace {

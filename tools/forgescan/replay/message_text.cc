@@ -89,7 +89,7 @@ std::vector<std::string> FieldDifferences(const LcmTypes& types, ByteView record
   std::vector<std::string> lines;
   Compare("", *before, *after, lines);
   if (lines.empty()) {  // two that are not a number, and differ in their bits
-    lines.push_back("the same values in other bits");
+    lines.emplace_back("the same values in other bits");
   }
   if (lines.size() > limit) {
     const std::size_t more = lines.size() - limit;
