@@ -127,7 +127,10 @@ TEST_F(TwoStations, HearNothingOfEachOther) {
   const auto status =
       Call(std::string(FORGESCAN_BIN_DIR) + "/forgescan station status --json " + Folder(0).string());
   EXPECT_NE(status.exit_code, 0) << "there are no devices";
-  const auto json = nlohmann::json::parse(status.text.substr(status.text.find("{\n")), nullptr, false);
+  const std::size_t begin = status.text.find("{\n"),
+                    end = status.text.rfind("}\n");  // then the error's sentence
+  ASSERT_LT(begin, end) << status.text;
+  const auto json = nlohmann::json::parse(status.text.substr(begin, end + 1 - begin), nullptr, false);
   ASSERT_FALSE(json.is_discarded()) << status.text;
   EXPECT_EQ(json["report"]["state"], "READY");
   EXPECT_EQ(json["robot"]["state"], "ERROR");
@@ -187,7 +190,7 @@ TEST_F(TwoStations, AStationThatIsUpIsNotStartedTwice) {
 TEST_F(TwoStations, AServiceThatCannotWorkEndsTheStartByName) {
   const fs::path broken = base_ / "broken";
   fs::copy(Folder(1), broken, fs::copy_options::recursive);
-  fs::remove(broken / "pattern.toml");
+  std::ofstream(broken / "pattern.toml") << "patterns = none\n";
   Background up({"forgescan", "station", "up", broken.string()}, base_ / "broken.txt");
   EXPECT_EQ(up.Wait(60), 1);
   EXPECT_THAT(up.Text(), HasSubstr("reconstruction ended with exit code 1"));

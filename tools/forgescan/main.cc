@@ -32,6 +32,7 @@ int Run(int argc, char** argv) {
     return 1;
   }
   if (!outcome.ok()) {
+    std::fflush(stdout);  // what there is comes before what is wrong with it; main() looks whether it came out
     std::fprintf(stderr, "forgescan: %s\n", outcome.error().message.c_str());
     return 1;
   }
