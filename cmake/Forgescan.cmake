@@ -24,6 +24,16 @@ if(FORGESCAN_SANITIZE)
   target_link_options(forgescan_options INTERFACE -fsanitize=${FORGESCAN_SANITIZE})
 endif()
 
+target_link_libraries(forgescan_options INTERFACE fmt::fmt)
+
+# What nearly every source includes is compiled once, for the product here and for the tests in tests/: it takes a third off a
+# clean build. The preset asan-ubsan builds without, so that every file still names what it needs.
+file(GENERATE OUTPUT ${CMAKE_BINARY_DIR}/generated/common_headers.cc CONTENT "")
+add_library(forgescan_headers OBJECT ${CMAKE_BINARY_DIR}/generated/common_headers.cc)
+target_link_libraries(forgescan_headers PRIVATE forgescan_options Eigen3::Eigen)
+target_precompile_headers(forgescan_headers PRIVATE <algorithm> <array> <cmath> <filesystem> <fmt/format.h> <functional> <map>
+                          <memory> <optional> <string> <vector> <Eigen/Geometry>)
+
 # What tests and the programs they start run with.
 if(FORGESCAN_SANITIZE)
   set(FORGESCAN_TEST_ENVIRONMENT "LSAN_OPTIONS=suppressions=${CMAKE_SOURCE_DIR}/tests/lsan.supp:print_suppressions=0"
@@ -35,16 +45,23 @@ function(forgescan_library name)
   cmake_parse_arguments(ARG "" "" "SOURCES;DEPS;PRIVATE_DEPS" ${ARGN})
   add_library(${name} STATIC ${ARG_SOURCES})
   target_link_libraries(${name} PUBLIC forgescan_options ${ARG_DEPS} PRIVATE ${ARG_PRIVATE_DEPS})
+  target_precompile_headers(${name} REUSE_FROM forgescan_headers)
 endfunction()
 
 # What a user runs, without the tests: cmake --build --preset release --target programs.
 add_custom_target(programs)
 
-# forgescan_program(NAME SOURCES... DEPS targets...): an executable in <build>/bin.
+# forgescan_program(NAME SOURCES... DEPS targets... [HEADERS headers...]): an executable in <build>/bin. HEADERS: those every
+# source of it includes, precompiled in place of the common ones.
 function(forgescan_program name)
-  cmake_parse_arguments(ARG "" "" "SOURCES;DEPS" ${ARGN})
+  cmake_parse_arguments(ARG "" "" "SOURCES;DEPS;HEADERS" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE forgescan_options ${ARG_DEPS})
+  if(ARG_HEADERS)
+    target_precompile_headers(${name} PRIVATE ${ARG_HEADERS})
+  else()
+    target_precompile_headers(${name} REUSE_FROM forgescan_headers)
+  endif()
   add_dependencies(programs ${name})
 endfunction()
 
@@ -54,7 +71,7 @@ endfunction()
 function(forgescan_test name)
   cmake_parse_arguments(ARG "NETWORK" "TIMEOUT" "SOURCES;DEPS" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
-  target_link_libraries(${name} PRIVATE forgescan_options ${ARG_DEPS} fmt::fmt GTest::gtest GTest::gmock GTest::gtest_main)
+  target_link_libraries(${name} PRIVATE forgescan_options ${ARG_DEPS} GTest::gtest GTest::gmock GTest::gtest_main)
   target_compile_definitions(${name} PRIVATE FORGESCAN_SOURCE_DIR="${CMAKE_SOURCE_DIR}"
                              FORGESCAN_BIN_DIR="${CMAKE_BINARY_DIR}/bin")
   target_precompile_headers(${name} REUSE_FROM forgescan_test_headers)

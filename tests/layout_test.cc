@@ -130,6 +130,7 @@ TEST(Layout, VendorHeadersStayInTheirFiles) {
   };
   const std::vector<Rule> rules = {
       {std::regex("^lcm/lcm"), std::regex("^services/common/bus/lcm_bus\\.cc$")},
+      {std::regex("^lcm/eventlog"), std::regex("^services/common/log/log_writer\\.cc$|^tests/common/log/")},
       {std::regex("^arv\\.h$"), std::regex("^drivers/camera/\\w+\\.cc$|^tests/drivers/camera/")},
       {std::regex("^linux/can"), std::regex("^drivers/can/can_socketcan\\.cc$")},
       {std::regex("^sqlite3\\.h$"), std::regex("^services/report/|^tests/services/report/")},
@@ -168,8 +169,8 @@ TEST(Layout, FilesAndMainsAreShort) {
 }
 
 TEST(Layout, EveryServiceHasItsPageAndItsMain) {
-  const std::set<std::string> services = {"trigger",        "camera", "robot",        "cooling",
-                                          "reconstruction", "fusion", "registration", "report"};
+  const std::set<std::string> services = {"trigger", "camera",       "robot",  "cooling", "reconstruction",
+                                          "fusion",  "registration", "report", "recorder"};
   for (const std::string& name : services) {
     for (const char* file : {"README.md", "main.cc"}) {
       EXPECT_TRUE(fs::exists(kSource / "services" / name / file)) << name << " has no " << file;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "services/common/base64.h"
 #include "services/report/report_charts.h"
 #include "services/report/report_style.h"
 #include "services/report/report_text.h"

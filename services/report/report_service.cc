@@ -12,8 +12,6 @@ namespace {
 
 constexpr std::size_t kFinishedParts = 1000;  // a message later than that opens its part anew, and times out
 constexpr double kUsPerSecond = 1e6;
-// A view that is being exposed when a scan is broken off is finished, and so is later than the scan's end.
-constexpr std::int64_t kAfterScanUs = 10'000'000;
 
 // "parts_ok", "parts_not_ok", ...
 std::string CounterName(Verdict verdict) {
@@ -42,6 +40,7 @@ ReportService::ReportService(StreamHub& hub, ServiceMonitor& monitor, Parts part
       config_(parts.config),
       station_(std::move(parts.station)),
       writer_(std::move(parts.writer)),
+      kept_(station_.results_folder + "/parts_in_work.txt"),
       evaluator_(evaluator),
       tally_(station_.services),
       pages_(hub.bus(), monitor, station_.name, {config_, writer_, evaluator_, tally_}),
@@ -49,6 +48,7 @@ ReportService::ReportService(StreamHub& hub, ServiceMonitor& monitor, Parts part
   Subscribe();
   SubscribeDurations();
   hub_.Advertise(kVerdict);
+  Resume();
   TellState();
 }
 
@@ -73,6 +73,7 @@ void ReportService::Subscribe() {
     NoteScan(message.part, message.scan_start_utime, message.utime);
     if (PartInWork* work = FindScan(message.part, message.utime); work != nullptr) {
       work->fusion = message;
+      Note(kept_.ResultsCame(message.part));
       FinishIfComplete(message.part);
     }
   });
@@ -80,6 +81,7 @@ void ReportService::Subscribe() {
     if (PartInWork* work = FindScan(message.part, message.utime); work != nullptr) {
       work->registration = message;
       work->registration_us = hub_.bus().NowUs();
+      Note(kept_.ResultsCame(message.part));
       FinishIfComplete(message.part);
     }
   });
@@ -94,8 +96,10 @@ void ReportService::SubscribeDurations() {
   hub_.Subscribe<fsmsg::processing_time_t>(kReconstructionTime, note);
   hub_.Subscribe<fsmsg::processing_time_t>(kFusionTime, note);
   hub_.Subscribe<fsmsg::processing_time_t>(kRegistrationTime, note);
-  SubscribeState<fsmsg::service_state_t>(
-      hub_.bus(), kServiceState, [this](const auto& state) { tally_.Note(state, hub_.bus().NowUs()); });
+  SubscribeState<fsmsg::service_state_t>(hub_.bus(), kServiceState, [this](const auto& state) {
+    tally_.Note(state, hub_.bus().NowUs());
+    OnRobotState(state);
+  });
 }
 
 // The line counts from the beginning again: two arrivals of a number are two parts, and so is an arrival
@@ -120,6 +124,7 @@ void ReportService::OnArrived(const fsmsg::part_arrived_t& message) {
   const bool again = EndEarlierPart(message);
   if (PartInWork* work = Find(message.part, message.utime); work != nullptr) {
     work->arrived = message;
+    Note(kept_.Arrived(message.part, message.utime));
     if (again) {
       work->ignore_before_utime = message.utime;
     }
@@ -131,6 +136,7 @@ void ReportService::OnSlice(const fsmsg::cloud_slice_t& message) {
   if (work == nullptr) {
     return;
   }
+  Note(kept_.ResultsCame(message.part));
   Result<std::optional<PointCloud>> cloud = assembler_.Add(message);
   if (!cloud.ok()) {
     work->cloud_error = fmt::format("The registered points cannot be used: {}.", cloud.error().message);
@@ -139,20 +145,6 @@ void ReportService::OnSlice(const fsmsg::cloud_slice_t& message) {
     work->cloud_in_model = std::move(**cloud);
   }
   FinishIfComplete(message.part);
-}
-
-void ReportService::OnDuration(const fsmsg::processing_time_t& message) {
-  if (PartInWork* work = FindStep(message.part, message.utime); work != nullptr) {
-    work->duration_us[message.step] += message.duration_us;
-  }
-}
-
-void ReportService::OnSorted(const fsmsg::part_sorted_t& message) {
-  monitor_.Count(message.acknowledged != 0 ? "sorted" : "sort_failed");
-  if (message.acknowledged == 0) {
-    Note(Fail(ErrorCode::kUnavailable, "part {}: the line did not acknowledge the verdict: {}", message.part,
-              message.reason));
-  }
 }
 
 PartInWork* ReportService::Find(int part, std::int64_t utime) {
@@ -184,17 +176,6 @@ PartInWork* ReportService::FindScan(int part, std::int64_t end_utime) {
   return work;
 }
 
-PartInWork* ReportService::FindStep(int part, std::int64_t utime) {
-  PartInWork* judged = pages_.Find(part);
-  if (judged != nullptr && judged->Covers(utime)) {
-    return judged;
-  }
-  const auto open = open_.find(part);
-  const bool late = open == open_.end() ? IsLate(part, utime - kAfterScanUs)
-                                        : utime > open->second.work.scan_end_utime.value_or(utime);
-  return late ? nullptr : Find(part, utime);
-}
-
 void ReportService::NoteScan(int part, std::int64_t start_utime, std::int64_t end_utime) {
   FinishedPart* finished = finished_.Find(part);
   if (finished != nullptr && finished->arrived.has_value() && finished->arrived->utime == start_utime) {
@@ -215,6 +196,7 @@ PartInWork& ReportService::OpenPart(int part, std::int64_t utime) {
     open.work.ignore_before_utime = finished->last_utime + 1;
   }
   open.work.sums_at_opening = tally_.Sums();
+  Note(kept_.Begin(part, utime));
   open.timeout = hub_.bus().At(hub_.bus().NowUs() + config_.part_timeout_us(), [this, part] {
     monitor_.Count("parts_timed_out");
     Finish(part);
@@ -279,8 +261,10 @@ void ReportService::GiveVerdict(int part) {
 // What goes wrong with files is told, but never keeps the verdict from the line.
 void ReportService::Publish(const PartReport& report, std::int64_t utime) {
   const std::string folder_name = ReportFolderName(report.part, utime);
+  const fsmsg::verdict_t verdict = VerdictMessage(report, utime, folder_name);
+  Note(kept_.Judged(verdict));  // from here on it is this verdict, whatever ends this process
   Note(writer_.WriteJson(report, folder_name));
-  Note(hub_.Publish(kVerdict, VerdictMessage(report, utime, folder_name)));
+  Note(hub_.Publish(kVerdict, verdict));
   Note(writer_.Remember(report, utime));
   monitor_.Count(CounterName(report.verdict.verdict));
 }

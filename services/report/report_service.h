@@ -15,6 +15,7 @@
 #include "services/common/bus/cloud_stream.h"
 #include "services/common/bus/stream_hub.h"
 #include "services/common/service/service_monitor.h"
+#include "services/report/kept_parts.h"
 #include "services/report/part_evaluator.h"
 #include "services/report/part_in_work.h"
 #include "services/report/report_config.h"
@@ -71,6 +72,12 @@ class ReportService {
   void OnSlice(const fsmsg::cloud_slice_t& message);
   void OnDuration(const fsmsg::processing_time_t& message);
   void OnSorted(const fsmsg::part_sorted_t& message);
+  // Says the verdicts again that a robot service started anew may have missed.
+  void OnRobotState(const fsmsg::service_state_t& state);
+  // Takes up the parts that the service before this one had in work.
+  void Resume();
+  void ResumePart(int part, const KeptPart& kept);
+  static fsmsg::part_arrived_t Arrival(int part, std::int64_t utime);
   // Notes for every part in work that a message of one stream was given up, which may have been its own.
   void OnLoss(bool PartInWork::*hole);
   void CheckLossesLater();
@@ -105,6 +112,7 @@ class ReportService {
   ReportConfig config_;
   ReportStation station_;
   ReportWriter writer_;
+  KeptParts kept_;
   const PartEvaluator& evaluator_;
   ServiceTally tally_;
   ReportPages pages_;  // after what it writes with
@@ -112,6 +120,7 @@ class ReportService {
   std::map<int, Open> open_;             // by part
   AgedMap<int, FinishedPart> finished_;  // the last ones, by part
   Bus::TimerId loss_timer_ = 0;          // 0 = none set
+  std::int64_t robot_session_ = 0;       // that has been told every verdict; 0 = none
 };
 
 }  // namespace forgescan

@@ -103,19 +103,4 @@ std::string CountText(const std::optional<std::int64_t>& value) {
   return value.has_value() ? CountText(*value) : std::string(kDash);
 }
 
-std::string Base64(std::span<const std::uint8_t> bytes) {
-  constexpr std::string_view kAlphabet = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string text;
-  text.reserve((bytes.size() + 2) / 3 * 4);
-  for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    const std::size_t have = std::min<std::size_t>(3, bytes.size() - i);
-    const unsigned group =
-        (bytes[i] << 16u) | (have > 1 ? bytes[i + 1] << 8u : 0u) | (have > 2 ? bytes[i + 2] : 0u);
-    for (std::size_t k = 0; k < 4; ++k) {
-      text += k <= have ? kAlphabet[(group >> (18 - 6 * k)) & 63u] : '=';
-    }
-  }
-  return text;
-}
-
 }  // namespace forgescan

@@ -3,7 +3,6 @@
 
 #include <cstdint>
 #include <optional>
-#include <span>
 #include <string>
 #include <string_view>
 
@@ -24,7 +23,5 @@ std::string SignedText(double value, int decimals);
 // known.
 std::string CountText(std::int64_t value);
 std::string CountText(const std::optional<std::int64_t>& value);
-
-std::string Base64(std::span<const std::uint8_t> bytes);
 
 }  // namespace forgescan

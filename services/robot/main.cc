@@ -22,8 +22,9 @@ Result<std::shared_ptr<void>> Make(const ServiceContext& context) {
   ASSIGN_OR_RETURN(running->can, OpenCanBus(context.station.can_url, [&bus] { return bus.NowUs(); }));
   running->robot = MakeCanRobot(*running->can);
   running->line = MakeCanLine(*running->can);
-  running->service = std::make_unique<RobotService>(
-      context.hub, context.monitor, RobotService::Devices{*running->robot, *running->line}, config);
+  running->service = std::make_unique<RobotService>(context.hub, context.monitor,
+                                                    RobotService::Devices{*running->robot, *running->line},
+                                                    config, context.station.folder + "/log/robot_parts.txt");
   bus.Watch(running->can->fd(), [running = running.get(), &monitor = context.monitor] {
     if (const Status drained = running->can->Drain(); !drained.ok()) {
       monitor.ReportError(drained.error());

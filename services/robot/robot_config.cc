@@ -19,6 +19,10 @@ Status RobotConfig::Check() const {
     return Fail(ErrorCode::kInvalidArgument, "robot: timeouts {}, {}, {} s must be above 0",
                 capture_timeout_s, home_timeout_s, gate_timeout_s);
   }
+  if (!(recording_timeout_s > 0)) {
+    return Fail(ErrorCode::kInvalidArgument, "robot: recording_timeout_s {} must be above 0",
+                recording_timeout_s);
+  }
   return {};
 }
 
@@ -36,6 +40,8 @@ Result<RobotConfig> RobotConfig::Load(ConfigTable table) {
   table.Optional("sort_resends", config.sort_resends, 0, 20);
   table.Optional("gate_timeout_s", config.gate_timeout_s, 0.1, 60);
   table.Optional("cooling_timeout_s", config.cooling_timeout_s, 0, 600);
+  table.Optional("require_recording", config.require_recording);
+  table.Optional("recording_timeout_s", config.recording_timeout_s, 0.6, 600);
   RETURN_IF_ERROR(table.Finish());
   RETURN_IF_ERROR(config.Check());
   return config;

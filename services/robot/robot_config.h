@@ -19,6 +19,8 @@ struct RobotConfig {
   double gate_timeout_s = 3;
   double cooling_timeout_s =
       5;  // without a cooling state for so long, or from the start, no part is inspected; 0: not watched
+  bool require_recording = false;  // no part without the recorder
+  double recording_timeout_s = 3;  // without a state of the recorder for so long; watched if required
 
   // Errors: kInvalidArgument, naming the field and its range.
   Status Check() const;

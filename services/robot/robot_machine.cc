@@ -94,6 +94,10 @@ RobotMachine::Actions RobotMachine::OnLink(bool up, std::int64_t now_us) {
   return actions;
 }
 
+RobotMachine::Actions RobotMachine::OnStop(std::int64_t now_us) {
+  return scanning() ? Abort("the robot service was stopped", now_us) : Actions{};
+}
+
 RobotMachine::Actions RobotMachine::OnPath(const RobotPath& path) {
   path_ = path;
   return {};

@@ -72,8 +72,14 @@ class RobotMachine {
   RobotPhase phase() const { return phase_; }
   std::int32_t part() const { return scanning() ? part_ : 0; }
   std::int32_t view() const { return view_; }
-  std::string Text() const;  // what it is doing, one line
+  std::int32_t captured() const { return captured_; }  // views of the part, so far
+  std::string Text() const;                            // what it is doing, one line
 
+  // Before the first event: this part was taken up by the service before this one, and is not again while it
+  // stays in place.
+  void Remember(std::int32_t part) { last_part_ = part; }
+  // Ends the scan that is under way, as the service stops.
+  Actions OnStop(std::int64_t now_us);
   Actions OnLink(bool up, std::int64_t now_us);
   Actions OnPath(const RobotPath& path);
   Actions OnStatus(const RobotStatus& status);
@@ -85,6 +91,8 @@ class RobotMachine {
   Actions OnCapture(const CaptureReport& report,
                     std::int64_t now_us);  // illegal unless capturing that view and attempt
   Actions OnInterlock(bool stop, const std::string& reason, std::int64_t now_us);
+  // Why the next part must not be begun, though one in work may be finished; empty = it may.
+  void HoldNextPart(std::string reason) { hold_reason_ = std::move(reason); }
   Actions OnTick(std::int64_t now_us);
 
  private:
@@ -117,6 +125,7 @@ class RobotMachine {
   std::optional<std::int32_t> last_part_;
   bool stop_ = false;
   std::string stop_reason_;
+  std::string hold_reason_;
 
   RobotCommand order_;
   bool echoed_ = false;

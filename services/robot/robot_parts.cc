@@ -22,6 +22,9 @@ std::string RobotMachine::WhyNot() const {
   if (stop_) {
     return stop_reason_;
   }
+  if (!hold_reason_.empty()) {
+    return hold_reason_;
+  }
   if (!path_ || !status_ || path_->view_count == 0) {
     return "the robot controller has no taught path";
   }

@@ -31,26 +31,32 @@ Statistics StatisticsOf(const std::vector<double>& values) {
 }  // namespace
 
 RobotService::RobotService(StreamHub& hub, ServiceMonitor& monitor, const Devices& devices,
-                           const RobotConfig& config)
+                           const RobotConfig& config, const std::string& memory_path)
     : hub_(hub),
       monitor_(monitor),
       devices_(devices),
       config_(config),
       machine_(config),
       sorter_(config),
+      memory_(memory_path),
       body_degc_(std::numeric_limits<double>::quiet_NaN()),
       part_degc_(std::numeric_limits<double>::quiet_NaN()) {
   Subscribe();
+  Resume();
   devices_.robot.SetHandler([this](const RobotEvent& event) { OnRobot(event); });
   devices_.line.SetHandler([this](const LineEvent& event) { OnLine(event); });
   timer_ = hub_.bus().Every(kStepPeriod_us, [this] { Step(); });
   if (config_.cooling_timeout_s > 0) {  // until the cooling service has spoken
     Do(machine_.OnInterlock(true, "no state of the cooling yet", Now()));
   }
+  if (config_.require_recording) {
+    machine_.HoldNextPart("recording interlock: no state of the recorder yet");
+  }
   ShowState();
 }
 
 RobotService::~RobotService() {
+  Do(machine_.OnStop(Now()));
   hub_.bus().Cancel(timer_);
   devices_.robot.SetHandler({});
   devices_.line.SetHandler({});
@@ -73,12 +79,15 @@ void RobotService::Subscribe() {
                       m.interlock == fsmsg::cooling_state_t::INTERLOCK_WARN;  // UNKNOWN stops
     Do(machine_.OnInterlock(!free, m.reason, Now()));
   });
+  SubscribeState<fsmsg::recorder_state_t>(hub_.bus(), kRecorderState,
+                                          [this](const fsmsg::recorder_state_t& m) { OnRecorder(m); });
 }
 
 void RobotService::Step() {
   devices_.robot.Step(Now());
   devices_.line.Step(Now());
   WatchCooling();
+  WatchRecorder();
   Do(machine_.OnTick(Now()));
   DoSort(sorter_.OnTick(Now()));
 }
@@ -88,6 +97,24 @@ void RobotService::WatchCooling() {
   if (watched && 1e-6 * static_cast<double>(Now() - last_cooling_us_) > config_.cooling_timeout_s) {
     last_cooling_us_ = 0;
     Do(machine_.OnInterlock(true, "the cooling service is silent", Now()));
+  }
+}
+
+// An inspection without its record is the lesser evil than one broken off: only the next part has to wait.
+void RobotService::OnRecorder(const fsmsg::recorder_state_t& recorder) {
+  if (!config_.require_recording) {
+    return;
+  }
+  last_recorder_us_ = Now();
+  const bool recording = recorder.status == fsmsg::recorder_state_t::STATUS_RECORDING;  // UNKNOWN holds
+  machine_.HoldNextPart(recording ? "" : fmt::format("recording interlock: {}", recorder.reason));
+}
+
+void RobotService::WatchRecorder() {
+  if (last_recorder_us_ != 0 &&
+      1e-6 * static_cast<double>(Now() - last_recorder_us_) > config_.recording_timeout_s) {
+    last_recorder_us_ = 0;
+    machine_.HoldNextPart("recording interlock: the recorder is silent");
   }
 }
 
@@ -123,26 +150,6 @@ void RobotService::OnLine(const LineEvent& event) {
   }
 }
 
-void RobotService::OnVerdict(const fsmsg::verdict_t& verdict) {
-  const bool known = verdict.verdict > fsmsg::verdict_t::VERDICT_UNKNOWN &&
-                     verdict.verdict <= fsmsg::verdict_t::VERDICT_NOT_INSPECTED && verdict.part > 0;
-  if (!known) {
-    monitor_.ReportError(Fail(ErrorCode::kInvalidArgument,
-                              "verdict {} of part {} is none: the part is not sorted", verdict.verdict,
-                              verdict.part));
-    return;
-  }
-  const std::int64_t* arrived_us = arrived_us_.Find(verdict.part);
-  if (arrived_us != nullptr && verdict.utime < *arrived_us) {
-    monitor_.ReportError(Fail(ErrorCode::kInvalidArgument,
-                              "a verdict on part {} is of an earlier part with this number: not sorted by it",
-                              verdict.part));
-    return;
-  }
-  DoSort(sorter_.OnVerdict(static_cast<std::uint32_t>(verdict.part),
-                           static_cast<LineVerdict>(verdict.verdict), Now()));
-}
-
 void RobotService::Do(const RobotMachine::Actions& actions) {
   for (const RobotAction& action : actions) {
     std::visit([this](const auto& one) { Do(one); }, action);
@@ -158,7 +165,7 @@ void RobotService::Do(const PartStarted& start) {
   message.path = config_.path;
   message.path_crc32 = static_cast<std::int32_t>(start.path_crc32);
   monitor_.Count("parts");
-  arrived_us_.Insert(message.part, message.utime);
+  Note(memory_.Begin(message.part, {.arrived_us = message.utime, .views = message.view_count}));
   Note(hub_.Publish(kPartArrived, message));
 }
 
@@ -185,6 +192,7 @@ void RobotService::Do(const ScanFinished& scan) {
   message.scan_start_utime = scan.start_utime;
   message.reason = scan.reason;
   monitor_.Count(complete ? "scans_complete" : "scans_aborted");
+  Note(memory_.Scanned(message.part));  // before it is told: never told twice
   Note(hub_.Publish(kScanComplete, message));
 }
 
@@ -198,6 +206,7 @@ void RobotService::Do(const ViewTemperature& view) {
   message.temperature_degc = statistics.mean;
   message.spread_k = statistics.spread;
   message.readings = static_cast<std::int32_t>(view.readings_degc.size());
+  Note(memory_.Captured(view.part, machine_.captured()));
   Note(hub_.Publish(kPartTemperature, message));
 }
 
@@ -224,6 +233,7 @@ void RobotService::PublishSorted(const PartSorted& sorted) {
   message.acknowledged = sorted.acknowledged ? 1 : 0;
   message.reason = sorted.reason;
   monitor_.Count(sorted.acknowledged ? "parts_sorted" : "sort_failures");
+  Note(memory_.Sorted(message.part));
   Note(hub_.Publish(kPartSorted, message));
 }
 

@@ -2,9 +2,9 @@
 // other.
 #pragma once
 
-#include "services/common/aged_map.h"
 #include "services/common/bus/channels.h"
 #include "services/common/service/service_monitor.h"
+#include "services/robot/part_memory.h"
 #include "services/robot/robot_machine.h"
 #include "services/robot/sort_machine.h"
 
@@ -18,20 +18,26 @@ class RobotService {
   };
 
   // Hub, monitor and devices must live as long as the service. The caller drains their bus. `config` passed
-  // Check().
-  RobotService(StreamHub& hub, ServiceMonitor& monitor, const Devices& devices, const RobotConfig& config);
+  // Check(). `memory_path`: of the file by which a service started again knows the last parts; empty = none.
+  RobotService(StreamHub& hub, ServiceMonitor& monitor, const Devices& devices, const RobotConfig& config,
+               const std::string& memory_path = "");
   RobotService(const RobotService&) = delete;
   RobotService& operator=(const RobotService&) = delete;
+  // Ends a scan that is under way, with a word on SCAN_COMPLETE.
   ~RobotService();
 
  private:
   std::int64_t Now() const { return hub_.bus().NowUs(); }
   void Subscribe();
+  // Takes up what the service before this one left: its scan is at an end, its part is not scanned again.
+  void Resume();
   void Step();
   void OnRobot(const RobotEvent& event);
   void OnLine(const LineEvent& event);
   void OnVerdict(const fsmsg::verdict_t& verdict);
   void WatchCooling();
+  void OnRecorder(const fsmsg::recorder_state_t& recorder);
+  void WatchRecorder();
   void Do(const RobotMachine::Actions& actions);
   void Do(const RobotCommand& command) { Note(devices_.robot.Send(command)); }
   void Do(const PartStarted& start);
@@ -51,11 +57,12 @@ class RobotService {
   RobotConfig config_;
   RobotMachine machine_;
   SortMachine sorter_;
-  AgedMap<std::int32_t, std::int64_t> arrived_us_{16};  // by part; more are not in the cell
+  PartMemory memory_;
   RobotStatus status_;
   double body_degc_;
   double part_degc_;
   std::int64_t last_cooling_us_ = 0;
+  std::int64_t last_recorder_us_ = 0;
   std::string shown_;
   Bus::TimerId timer_;
 };

@@ -1,4 +1,6 @@
 // Holds lcmtypes/README.md, lcmtypes/*.lcm and the channel constants of the code together.
+#include "services/common/bus/channel_list.h"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -8,6 +10,8 @@
 #include <regex>
 #include <set>
 #include <sstream>
+
+#include "services/common/log/message_definitions.h"
 
 namespace {
 
@@ -65,6 +69,30 @@ TEST(ChannelList, ReadmeListsExactlyTheChannelsOfTheCode) {
   ASSERT_GT(rows.size(), 20u);
   std::erase_if(rows, [](const auto& row) { return row.second.kind == "protocol"; });
   EXPECT_EQ(rows, ChannelsOfCode());
+}
+
+TEST(ChannelList, TheListAsDataIsThatOfTheCode) {
+  std::map<std::string, Row> listed;
+  for (const forgescan::ChannelInfo& channel : forgescan::AllChannels()) {
+    const char* kind = channel.kind == forgescan::ChannelKind::kStream  ? "stream"
+                       : channel.kind == forgescan::ChannelKind::kState ? "state"
+                                                                        : "log";
+    listed[channel.name] = {channel.type, kind};
+    EXPECT_NE(channel.fingerprint, 0) << channel.name;
+  }
+  EXPECT_EQ(listed, ChannelsOfCode());
+}
+
+TEST(ChannelList, TheEmbeddedDefinitionsAreTheFiles) {
+  std::map<std::string, std::string> files, embedded;
+  for (const auto& file : TypeFiles()) {
+    files[file.stem()] = ReadAll(file);
+  }
+  for (const forgescan::MessageDefinition& definition : forgescan::MessageDefinitions()) {
+    embedded[std::string(definition.name)] = definition.text;
+  }
+  EXPECT_EQ(embedded, files);
+  EXPECT_NE(forgescan::AllMessageDefinitions().find("struct frame_t {"), std::string::npos);
 }
 
 TEST(ChannelList, ProtocolChannelsAreListed) {

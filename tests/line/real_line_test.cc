@@ -89,6 +89,13 @@ TEST_P(RealLine, InspectsAnAxle) {
   EXPECT_EQ(counters["frames_lost"], 0);
   EXPECT_EQ(counters["messages_missing"], 0);
   EXPECT_EQ(counters["restarts"], 0);
+  std::vector<std::string> recordings;
+  for (const auto& entry : fs::directory_iterator(report_folder / "../../../recordings/parts")) {
+    recordings.push_back(entry.path().filename().string());
+  }
+  ASSERT_EQ(recordings.size(), 1u);
+  EXPECT_TRUE(recordings[0].ends_with("_part000001_" + report["verdict"].get<std::string>() + ".lcmlog"))
+      << recordings[0] << " is not the whole part";
   EXPECT_NEAR(report["registration"]["foreign_share"].get<double>(), 0.22, 0.05)
       << "the cell should have about 22 % clutter";
 }

@@ -4,6 +4,7 @@
 
 #include <fstream>
 #include <sstream>
+#include <string_view>
 
 #include "services/common/model/bundle_file.h"
 #include "services/common/model/model_import.h"
@@ -19,13 +20,21 @@ namespace fs = std::filesystem;
 
 constexpr int kScaleDivisor = 4;
 constexpr int kThreads = 2;
+// Of a sixteenth of the pixels, more points are kept.
+constexpr std::string_view kThinning = "publish_every_nth_point = 8";
+constexpr std::string_view kThinningOfSmallImages = "publish_every_nth_point = 2";
 const fs::path kStation = FORGESCAN_SOURCE_DIR "/stations/virtual";
 
 Status WriteFiles(const CellConfig& config, const fs::path& folder) {
   RETURN_IF_ERROR(WriteStation(config, ProjectedSet::kReduced, folder.string()));
   std::stringstream station;
   station << std::ifstream(kStation / "station.toml").rdbuf();
-  ASSIGN_OR_RETURN(const std::string commissioned, CommissionedStation(config, station.str()));
+  ASSIGN_OR_RETURN(std::string commissioned, CommissionedStation(config, station.str()));
+  const std::size_t thinning = commissioned.find(kThinning);
+  if (thinning == std::string::npos) {
+    return Fail(ErrorCode::kNotFound, "{}: \"{}\" is not in it", kStation.string(), kThinning);
+  }
+  commissioned.replace(thinning, kThinning.size(), kThinningOfSmallImages);
   RETURN_IF_ERROR(WriteWholeFile((folder / "station.toml").string(), commissioned));
   ASSIGN_OR_RETURN(const ModelBundle model, LoadModel(folder / "model" / "axle.step", {}));
   return WriteBundle(model, folder / "model" / "axle.bundle");

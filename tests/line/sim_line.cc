@@ -6,7 +6,10 @@
 #include <filesystem>
 
 #include "services/common/bus/channels.h"
-#include "services/common/model/bundle_file.h"
+#include "services/fusion/make_fusion_service.h"
+#include "services/reconstruction/make_reconstruction_service.h"
+#include "services/registration/make_registration_service.h"
+#include "services/report/make_report_service.h"
 
 namespace forgescan::testing {
 namespace {
@@ -14,7 +17,6 @@ namespace {
 constexpr std::int64_t kSecondUs = 1'000'000;
 constexpr std::int64_t kPartPatienceUs = 70 * kSecondUs;  // takt 45 s, then what a lossy bus adds
 constexpr std::int64_t kDispatchUs = 5'000;
-constexpr int kEveryNthPoint = 2;                                   // published, of a sixteenth of the pixels
 constexpr std::int64_t kCameraClockUs[2] = {7'654'321, 1'234'567};  // ahead of the station's
 
 RobotSimConfig RobotOf(const RenderedCell& cell) {
@@ -31,16 +33,26 @@ LineSimConfig LineOf(int parts, int first_part) {
   return config;
 }
 
+// A folder of its own for every line.
+std::filesystem::path MakeRecordings(const RenderedCell& cell) {
+  int line = 0;
+  std::filesystem::path folder;
+  do {
+    folder = cell.folder() / ("recordings-" + std::to_string(++line));
+  } while (!std::filesystem::create_directory(folder));
+  return folder;
+}
+
 }  // namespace
 
 Result<std::unique_ptr<SimLine>> SimLine::Create(RenderedCell& cell, int parts, int first_part) {
   std::unique_ptr<SimLine> line(new SimLine(cell, LineOf(parts, first_part)));
   ASSIGN_OR_RETURN(const Station station, Station::Load(cell.folder().string()));
+  RETURN_IF_ERROR(line->MakeRecorder(station));
   RETURN_IF_ERROR(line->MakeCellServices(station));
   RETURN_IF_ERROR(line->MakeCamera(station, 0));
   RETURN_IF_ERROR(line->MakeCamera(station, 1));
-  RETURN_IF_ERROR(line->MakeViewServices(station));
-  RETURN_IF_ERROR(line->MakePartServices(station));
+  RETURN_IF_ERROR(line->MakeComputeServices(station));
   line->Observe();
   return line;
 }
@@ -48,7 +60,7 @@ Result<std::unique_ptr<SimLine>> SimLine::Create(RenderedCell& cell, int parts, 
 SimLine::SimLine(RenderedCell& cell, const LineSimConfig& line)
     : cell_(cell), robot_(RobotOf(cell)), line_(line) {
   for (const char* name : {"robot", "trigger", "cooling", "camera_left", "camera_right", "reconstruction",
-                           "fusion", "registration", "report", "observer"}) {
+                           "fusion", "registration", "report", "recorder", "observer"}) {
     hosts_[name] = std::make_unique<Host>(network_, name);
   }
   CameraSimOptions camera;
@@ -87,42 +99,45 @@ Status SimLine::MakeCamera(const Station& station, std::size_t side) {
   return {};
 }
 
-Status SimLine::MakeViewServices(const Station& station) {
-  ASSIGN_OR_RETURN(auto reconstruction,
-                   ReconstructionServiceConfig::Load(station.file.Table("reconstruction")));
-  reconstruction.publish_every_nth_point = kEveryNthPoint;
-  ASSIGN_OR_RETURN(PatternSet pattern, LoadPatternSet(station.pattern));
-  ASSIGN_OR_RETURN(StereoCalibration calibration, LoadStereoCalibration(station.calibration));
-  reconstruction_service_ =
-      std::make_unique<ReconstructionService>(At("reconstruction").hub, At("reconstruction").monitor,
-                                              reconstruction, std::move(pattern), std::move(calibration));
-  ASSIGN_OR_RETURN(FusionConfig fusion, FusionConfig::Load(station.file.Table("fusion")));
-  ASSIGN_OR_RETURN(ExpansionCurve curve, ExpansionCurve::Create(fusion.expansion_degc, fusion.expansion));
-  ASSIGN_OR_RETURN(ViewMatrices matrices, ViewMatrices::Load(station.views));
-  fusion_service_ = std::make_unique<FusionService>(At("fusion").hub, At("fusion").monitor, std::move(fusion),
-                                                    std::move(matrices), std::move(curve));
+Status SimLine::MakeComputeServices(const Station& station) {
+  std::error_code ignored;  // there may be none
+  std::filesystem::remove_all(station.results, ignored);
+  const auto parts = [&](const char* name) -> ServiceParts {
+    return {station, At(name).hub, At(name).monitor};
+  };
+  struct Maker {
+    const char* name;
+    Result<std::shared_ptr<void>> (*make)(const ServiceParts&);
+  };
+  for (const auto& [name, make] : {Maker{"reconstruction", MakeReconstructionService},
+                                   {"fusion", MakeFusionService},
+                                   {"registration", MakeRegistrationService},
+                                   {"report", MakeReportService}}) {
+    ASSIGN_OR_RETURN(compute_services_.emplace_back(), make(parts(name)));
+  }
   return {};
 }
 
-Status SimLine::MakePartServices(const Station& station) {
-  ASSIGN_OR_RETURN(RegistrationConfig registration,
-                   RegistrationConfig::Load(station.file.Table("registration")));
-  ASSIGN_OR_RETURN(const ModelBundle bundle, ReadBundle(station.model));
-  ASSIGN_OR_RETURN(RegistrationModel model, RegistrationModel::Build(bundle));
-  registration_service_ = std::make_unique<RegistrationService>(
-      At("registration").hub, At("registration").monitor, std::move(registration), std::move(model));
-  std::error_code ignored;  // there may be none
-  std::filesystem::remove_all(station.results, ignored);
-  ASSIGN_OR_RETURN(const ReportConfig report, ReportConfig::Load(station.file.Table("report")));
-  ASSIGN_OR_RETURN(evaluator_, ModelEvaluator::Load(station.model, station.features, report.dimensions));
-  ASSIGN_OR_RETURN(report_service_, ReportService::Create(At("report").hub, At("report").monitor, report,
-                                                          {station.name,
-                                                           "0",
-                                                           station.file.hash(),
-                                                           station.results,
-                                                           {kServiceNames.begin(), kServiceNames.end()}},
-                                                          *evaluator_));
+Status SimLine::MakeRecorder(const Station& station) {
+  ASSIGN_OR_RETURN(RecorderConfig config, RecorderConfig::Load(station.file.Table("recorder")));
+  config.folder = recordings_ = MakeRecordings(cell_);
+  ASSIGN_OR_RETURN(std::vector<StationFile> files, StationFilesOf(station));
+  ASSIGN_OR_RETURN(recorder_service_,
+                   RecorderService::Create(At("recorder").hub, At("recorder").monitor, config,
+                                           {station.name, "0", "", station.file.hash(), std::move(files)}));
+  recorder_service_->Drain();  // it records before the first part comes, however short that is in real time
   return {};
+}
+
+std::string SimLine::StopRecording() {
+  recorder_service_.reset();
+  return recordings_;
+}
+
+SimLine::~SimLine() {
+  recorder_service_.reset();
+  std::error_code ignored;
+  std::filesystem::remove_all(recordings_, ignored);
 }
 
 void SimLine::Observe() {

@@ -19,11 +19,7 @@
 #include "services/common/bus/sim_bus.h"
 #include "services/common/service/station.h"
 #include "services/cooling/cooling_service.h"
-#include "services/fusion/fusion_service.h"
-#include "services/reconstruction/reconstruction_service.h"
-#include "services/registration/registration_service.h"
-#include "services/report/model_evaluator.h"
-#include "services/report/report_service.h"
+#include "services/recorder/recorder_service.h"
 #include "services/robot/robot_service.h"
 #include "services/trigger/trigger_service.h"
 #include "tests/line/rendered_cell.h"
@@ -54,6 +50,10 @@ class SimLine {
   // files.
   static Result<std::unique_ptr<SimLine>> Create(RenderedCell& cell, int parts, int first_part = 1);
 
+  SimLine(const SimLine&) = delete;
+  SimLine& operator=(const SimLine&) = delete;
+  ~SimLine();  // and of its recordings
+
   void SetBusFaults(const SimFaults& faults) { network_.SetFaults(faults); }
   void LoseFrame(const LostFrame& frame) { lost_frame_ = frame; }
   RobotSim& robot() { return robot_; }
@@ -74,6 +74,8 @@ class SimLine {
   const std::vector<LineCommand>& commands() const { return line_.sorted(); }
   // Every message from VIEW_CLOUD to VERDICT in order of arrival, with its channel before it.
   const std::vector<Bytes>& published() const { return published_; }
+  // Closes the recordings, as SIGTERM does; returns their folder.
+  std::string StopRecording();
   // Sums over all services.
   StreamCounters StreamTotals() const;
   std::int64_t Total(const std::string& counter) const;
@@ -83,8 +85,8 @@ class SimLine {
   Host& At(const char* name) { return *hosts_.at(name); }
   Status MakeCellServices(const Station& station);
   Status MakeCamera(const Station& station, std::size_t side);
-  Status MakeViewServices(const Station& station);
-  Status MakePartServices(const Station& station);
+  Status MakeComputeServices(const Station& station);
+  Status MakeRecorder(const Station& station);
   void Observe();
   void Record(const char* channel);
   void Expose(const TriggerSim::Edge& edge);
@@ -103,11 +105,9 @@ class SimLine {
   std::unique_ptr<TriggerService> trigger_service_;
   std::unique_ptr<CoolingService> cooling_service_;
   std::array<std::unique_ptr<CameraService>, 2> camera_services_;
-  std::unique_ptr<ReconstructionService> reconstruction_service_;
-  std::unique_ptr<FusionService> fusion_service_;
-  std::unique_ptr<RegistrationService> registration_service_;
-  std::unique_ptr<ModelEvaluator> evaluator_;
-  std::shared_ptr<ReportService> report_service_;  // after the evaluator: it goes first
+  std::vector<std::shared_ptr<void>> compute_services_;  // reconstruction, fusion, registration, report
+  std::unique_ptr<RecorderService> recorder_service_;
+  std::string recordings_;
 
   std::vector<fsmsg::view_captured_t> views_;
   std::vector<fsmsg::scan_complete_t> scans_;

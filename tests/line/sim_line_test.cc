@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tests/services/recorder/recordings.h"
+
 namespace forgescan {
 namespace {
 
@@ -71,6 +73,25 @@ class SimLineTest : public ::testing::Test {
     }
   }
 
+  // The part has one recording, which holds its images and its verdict and lacks nothing. Ends the line's
+  // recording.
+  static void ExpectRecorded(SimLine& line, int part, int verdict) {
+    const auto parts = testing::OfPart(testing::ReadRecordings(line.StopRecording()), part);
+    ASSERT_EQ(parts.size(), 1u);
+    EXPECT_EQ(parts[0].name.verdict, verdict);
+    ASSERT_TRUE(parts[0].closed.has_value());
+    for (const fsmsg::recording_gap_t& gap : parts[0].closed->gaps) {
+      ADD_FAILURE() << gap.channel << ": " << gap.reason;
+    }
+    const auto views = static_cast<std::size_t>(cell_->view_count());
+    EXPECT_EQ(parts[0].On("FRAME_LEFT").size(), 8 * views);
+    EXPECT_EQ(parts[0].On("FRAME_RIGHT").size(), 8 * views);
+    EXPECT_EQ(parts[0].On("VIEW_RESULT").size(), views);
+    EXPECT_EQ(parts[0].On("VERDICT").size(), 1u);
+    EXPECT_EQ(parts[0].On("RECORDED_FILE").size(), 6u);
+    EXPECT_GT(parts[0].On("COOLING_STATE").size(), 0u);
+  }
+
   // What the truth makes of a size: a verdict where it is farther than 2 U from both limits, so that no
   // measurement within U of it can say otherwise; nearer, none is right or wrong.
   static void ExpectVerdictsAsTheTruth(const fsmsg::verdict_t& verdict) {
@@ -130,6 +151,7 @@ TEST_F(SimLineTest, MeasuresAndSortsAPart) {
   EXPECT_EQ(line->Total("frames_missing"), 0);
   EXPECT_EQ(line->Total("errors"), 0);
   EXPECT_EQ(line->published(), Nominal().published);
+  ExpectRecorded(*line, 1, kOk);
 }
 
 // Parts 6 and 7 of stations/virtual/cell.toml are too short, and nearer to a limit than can be measured.
@@ -170,6 +192,7 @@ TEST_F(SimLineTest, ABusThatLosesATenthChangesNoSize) {
     // mm: the mean of equal pyrometer readings rounds differently for another number of them.
     EXPECT_NEAR(measured[i].measured_mm, Nominal().dimensions[i].measured_mm, 1e-6) << measured[i].name;
   }
+  ExpectRecorded(*line, 1, kOk);
 }
 
 TEST_F(SimLineTest, ALostFrameVoidsItsPartAndTheNextIsGood) {

@@ -14,5 +14,8 @@ void AddFitCommand(CLI::App& app, Status& outcome);
 void AddModelCommand(CLI::App& app, Status& outcome);
 void AddStationCommand(CLI::App& app, Status& outcome);
 void AddInspectCommand(CLI::App& app, Status& outcome);
+void AddReplayCommand(CLI::App& app, Status& outcome);
+void AddPlayCommand(CLI::App& app, Status& outcome);
+void AddLogCommand(CLI::App& app, Status& outcome);
 
 }  // namespace forgescan

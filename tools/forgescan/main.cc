@@ -16,6 +16,9 @@ int Run(int argc, char** argv) {
     forgescan::AddModelCommand(app, outcome);
     forgescan::AddStationCommand(app, outcome);
     forgescan::AddInspectCommand(app, outcome);
+    forgescan::AddReplayCommand(app, outcome);
+    forgescan::AddPlayCommand(app, outcome);
+    forgescan::AddLogCommand(app, outcome);
     const auto is_named = [argv](const CLI::App* command) { return command->check_name(argv[1]); };
     if (argc > 1 && argv[1][0] != '-' && app.get_subcommands(is_named).empty()) {
       std::fprintf(stderr, "forgescan: %s is no command, --help lists them\n", argv[1]);
@@ -29,6 +32,7 @@ int Run(int argc, char** argv) {
     return 1;
   }
   if (!outcome.ok()) {
+    std::fflush(stdout);  // what there is comes before what is wrong with it; main() looks whether it came out
     std::fprintf(stderr, "forgescan: %s\n", outcome.error().message.c_str());
     return 1;
   }

@@ -35,6 +35,7 @@ class Bus : public Clock {
   using MessageHandler = std::function<void(ByteView)>;
   using TimerHandler = std::function<void()>;
   using TimerId = std::uint64_t;
+  using SubscriptionId = std::uint64_t;
 
   // Sends to every subscriber of the channel in every process, this one included.
   // Errors: kInvalidArgument (too large, channel name empty or over 63 characters), kIo (the network
@@ -42,7 +43,9 @@ class Bus : public Clock {
   virtual Status Publish(std::string_view channel, ByteView message) = 0;
   // Delivery is unreliable and unordered, as the network's; see StreamHub for streams that are complete and
   // in order.
-  virtual void Subscribe(const std::string& channel, MessageHandler handler) = 0;
+  virtual SubscriptionId Subscribe(const std::string& channel, MessageHandler handler) = 0;
+  // The handler does not run any more; what it refers to may go. Not to be called inside a message handler.
+  virtual void Unsubscribe(SubscriptionId subscription) = 0;
 
   // Runs the handler once, not before `utime`. Timers due at the same time run in the order they were set.
   virtual TimerId At(std::int64_t utime, TimerHandler handler) = 0;

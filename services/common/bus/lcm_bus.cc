@@ -64,6 +64,7 @@ std::string Escaped(std::string_view channel) {
 
 struct LcmBus::Subscription {
   MessageHandler handler;
+  lcm_subscription_t* held_by_lcm = nullptr;
 
   static void OnMessage(const lcm_recv_buf_t* buffer, const char*, void* self) {
     static_cast<Subscription*>(self)->handler(
@@ -105,12 +106,19 @@ Status LcmBus::Publish(std::string_view channel, ByteView message) {
   return {};
 }
 
-void LcmBus::Subscribe(const std::string& channel, MessageHandler handler) {
-  auto& held = subscriptions_.emplace_back(std::make_unique<Subscription>(Subscription{std::move(handler)}));
-  lcm_subscription_t* subscription =
-      lcm_subscribe(lcm_, Escaped(channel).c_str(), &Subscription::OnMessage, held.get());
-  lcm_subscription_set_queue_capacity(subscription,
-                                      0);  // unlimited: LCM's default drops the newest in silence
+Bus::SubscriptionId LcmBus::Subscribe(const std::string& channel, MessageHandler handler) {
+  auto held = std::make_unique<Subscription>(Subscription{std::move(handler)});
+  held->held_by_lcm = lcm_subscribe(lcm_, Escaped(channel).c_str(), &Subscription::OnMessage, held.get());
+  // Unlimited: LCM's default drops the newest in silence.
+  lcm_subscription_set_queue_capacity(held->held_by_lcm, 0);
+  subscriptions_[++last_subscription_] = std::move(held);
+  return last_subscription_;
+}
+
+void LcmBus::Unsubscribe(SubscriptionId subscription) {
+  if (const auto found = subscriptions_.extract(subscription); !found.empty()) {
+    lcm_unsubscribe(lcm_, found.mapped()->held_by_lcm);
+  }
 }
 
 Bus::TimerId LcmBus::At(std::int64_t utime, TimerHandler handler) {

@@ -27,7 +27,8 @@ class LcmBus final : public Bus {
 
   std::int64_t NowUs() const override { return clock_.NowUs(); }
   Status Publish(std::string_view channel, ByteView message) override;
-  void Subscribe(const std::string& channel, MessageHandler handler) override;
+  SubscriptionId Subscribe(const std::string& channel, MessageHandler handler) override;
+  void Unsubscribe(SubscriptionId subscription) override;
   TimerId At(std::int64_t utime, TimerHandler handler) override;
   TimerId Every(std::int64_t period_us, TimerHandler handler) override;
   void Cancel(TimerId timer) override;
@@ -52,7 +53,8 @@ class LcmBus final : public Bus {
   std::uint64_t socket_inode_ = 0;
   int receive_buffer_bytes_ = 0;
   TimerQueue timers_;
-  std::vector<std::unique_ptr<Subscription>> subscriptions_;
+  std::map<SubscriptionId, std::unique_ptr<Subscription>> subscriptions_;
+  SubscriptionId last_subscription_ = 0;
   std::map<int, std::function<void()>> watches_;
   bool stopped_ = false;
 };

@@ -22,6 +22,11 @@ void SimNetwork::RemoveNode(SimBus& node) {
   std::erase_if(nodes_, [&node](const auto& held) { return held.get() == &node; });
 }
 
+bool SimNetwork::IsHeard(std::string_view channel) const {
+  return std::any_of(nodes_.begin(), nodes_.end(),
+                     [channel](const auto& node) { return node->handlers_.contains(channel); });
+}
+
 void SimNetwork::Send(const std::string& channel, ByteView message) {
   const auto shared = std::make_shared<const Bytes>(message.begin(), message.end());
   const double loss = message.size() > kDatagramBytes ? faults_.large_loss : faults_.loss;
@@ -48,7 +53,7 @@ void SimNetwork::Deliver(SimBus* node, const std::string& channel, std::shared_p
   }
   const auto [first, last] = node->handlers_.equal_range(channel);
   for (auto handler = first; handler != last; ++handler) {
-    handler->second(*message);
+    handler->second.handler(*message);
   }
 }
 
@@ -90,8 +95,13 @@ Status SimBus::Publish(std::string_view channel, ByteView message) {
   return {};
 }
 
-void SimBus::Subscribe(const std::string& channel, MessageHandler handler) {
-  handlers_.emplace(channel, std::move(handler));
+Bus::SubscriptionId SimBus::Subscribe(const std::string& channel, MessageHandler handler) {
+  handlers_.emplace(channel, Subscription{++last_subscription_, std::move(handler)});
+  return last_subscription_;
+}
+
+void SimBus::Unsubscribe(SubscriptionId subscription) {
+  std::erase_if(handlers_, [subscription](const auto& held) { return held.second.id == subscription; });
 }
 
 Bus::TimerId SimBus::At(std::int64_t utime, TimerHandler handler) {

@@ -32,6 +32,8 @@ class SimNetwork final : public Clock {
   SimBus& AddNode();
   void RemoveNode(SimBus& node);
 
+  // True if a node has subscribed to the channel.
+  bool IsHeard(std::string_view channel) const;
   void SetFaults(const SimFaults& faults) { faults_ = faults; }
   std::int64_t NowUs() const override { return now_us_; }
   // Runs everything due until then; the time is `until_us` afterwards.
@@ -61,7 +63,8 @@ class SimBus final : public Bus {
 
   std::int64_t NowUs() const override { return network_.NowUs(); }
   Status Publish(std::string_view channel, ByteView message) override;
-  void Subscribe(const std::string& channel, MessageHandler handler) override;
+  SubscriptionId Subscribe(const std::string& channel, MessageHandler handler) override;
+  void Unsubscribe(SubscriptionId subscription) override;
   TimerId At(std::int64_t utime, TimerHandler handler) override;
   TimerId Every(std::int64_t period_us, TimerHandler handler) override;
   void Cancel(TimerId timer) override;
@@ -70,7 +73,12 @@ class SimBus final : public Bus {
  private:
   friend class SimNetwork;
   SimNetwork& network_;
-  std::multimap<std::string, MessageHandler, std::less<>> handlers_;
+  struct Subscription {
+    SubscriptionId id;
+    MessageHandler handler;
+  };
+  std::multimap<std::string, Subscription, std::less<>> handlers_;  // by channel
+  SubscriptionId last_subscription_ = 0;
   std::vector<TimerId> timers_;  // set by this node, so that they die with it
 };
 

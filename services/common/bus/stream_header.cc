@@ -8,7 +8,7 @@
 namespace forgescan {
 namespace {
 
-constexpr std::size_t kSessionAt = 16, kSequenceAt = 24, kCrcAt = 32;
+constexpr std::size_t kUtimeAt = 8, kSessionAt = 16, kSequenceAt = 24, kCrcAt = 32;
 
 template <typename Integer>
 void Put(Bytes& message, std::size_t at, Integer value) {
@@ -45,6 +45,13 @@ Status StampStreamHeader(Bytes& message, const StreamHeader& header) {
   Put(message, kSequenceAt, header.sequence);
   Put(message, kCrcAt, CrcWithoutItself(message));
   return {};
+}
+
+Result<std::int64_t> StreamUtime(ByteView message) {
+  if (message.size() < kStreamHeaderBytes) {
+    return Fail(ErrorCode::kFormat, "{} bytes are too short for a stream message", message.size());
+  }
+  return Get<std::int64_t>(message, kUtimeAt);
 }
 
 Result<StreamHeader> CheckStreamHeader(ByteView message) {

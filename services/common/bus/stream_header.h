@@ -19,6 +19,8 @@ inline constexpr std::size_t kStreamHeaderBytes = 36;
 
 // Errors: kInvalidArgument (the message is shorter than a header).
 Status StampStreamHeader(Bytes& message, const StreamHeader& header);
+// When the message's event was, us since 1970 UTC. Errors: kFormat (shorter than a header).
+Result<std::int64_t> StreamUtime(ByteView message);
 // Errors: kFormat (too short, or the CRC does not match its bytes).
 Result<StreamHeader> CheckStreamHeader(ByteView message);
 

@@ -12,7 +12,7 @@ constexpr std::int64_t kTimerPeriodUs = 10'000;
 
 StreamHub::StreamHub(Bus& bus, const std::string& sender, const StreamOptions& options)
     : bus_(bus), options_(options), sender_(bus, sender, options, counters_) {
-  bus_.Subscribe(kStreamStatusChannel, [this](ByteView bytes) {
+  Hear(kStreamStatusChannel, [this](ByteView bytes) {
     const auto status = Decode<fsmsg::stream_status_t>(bytes);
     if (!status.ok()) {
       ++counters_.damaged;
@@ -24,11 +24,11 @@ StreamHub::StreamHub(Bus& bus, const std::string& sender, const StreamOptions& o
       }
     }
   });
-  bus_.Subscribe(kResendRequestChannel, [this](ByteView bytes) {
+  Hear(kResendRequestChannel, [this](ByteView bytes) {
     const auto request = Decode<fsmsg::resend_request_t>(bytes);
     request.ok() ? sender_.OnRequest(*request) : static_cast<void>(++counters_.damaged);
   });
-  bus_.Subscribe(kResendPieceChannel, [this](ByteView bytes) {
+  Hear(kResendPieceChannel, [this](ByteView bytes) {
     const auto piece = Decode<fsmsg::resend_piece_t>(bytes);
     const auto found = piece.ok() ? receivers_.find(piece->channel) : receivers_.end();
     if (found != receivers_.end()) {
@@ -42,13 +42,22 @@ StreamHub::StreamHub(Bus& bus, const std::string& sender, const StreamOptions& o
   });
 }
 
-StreamHub::~StreamHub() { bus_.Cancel(timer_); }
+StreamHub::~StreamHub() {
+  bus_.Cancel(timer_);
+  for (const Bus::SubscriptionId subscription : subscriptions_) {
+    bus_.Unsubscribe(subscription);
+  }
+}
+
+void StreamHub::Hear(const std::string& channel, Bus::MessageHandler handler) {
+  subscriptions_.push_back(bus_.Subscribe(channel, std::move(handler)));
+}
 
 StreamReceiver& StreamHub::Receiver(const std::string& channel) {
   auto& receiver = receivers_[channel];
   if (receiver == nullptr) {
     receiver = std::make_unique<StreamReceiver>(bus_, channel, options_, counters_);
-    bus_.Subscribe(channel, [to = receiver.get()](ByteView bytes) { to->OnMessage(bytes); });
+    Hear(channel, [to = receiver.get()](ByteView bytes) { to->OnMessage(bytes); });
   }
   return *receiver;
 }

@@ -8,6 +8,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "services/common/bus/channel.h"
 #include "services/common/bus/codec.h"
@@ -38,6 +39,12 @@ class StreamHub {
   Status Publish(const Channel<Message>& channel, const Message& message) {
     return sender_.Publish(channel.name, Encode(message));
   }
+  // The same for a message whose type only its receivers know (play). Errors: kInvalidArgument (too large, or
+  // too short for a stream's header).
+  void AdvertiseChannel(const std::string& channel) { sender_.Advertise(channel); }
+  Status PublishBytes(const std::string& channel, Bytes message) {
+    return sender_.Publish(channel, std::move(message));
+  }
   // Every message once, in order. What does not decode is counted, never delivered.
   template <typename Message>
   void Subscribe(const Channel<Message>& channel, std::function<void(const Message&)> handler) {
@@ -51,6 +58,19 @@ class StreamHub {
   void OnLost(const Channel<Message>& channel, StreamReceiver::LostHandler handler) {
     Receiver(channel.name).SetLostHandler(std::move(handler));
   }
+  // Every message once, in order and whole, but not decoded: for whoever keeps messages as they are, of any
+  // channel.
+  void SubscribeRaw(const std::string& channel, StreamReceiver::Handler handler) {
+    Receiver(channel).SetHandler(std::move(handler));
+  }
+  void OnLost(const std::string& channel, StreamReceiver::LostHandler handler) {
+    Receiver(channel).SetLostHandler(std::move(handler));
+  }
+  // Of a channel never subscribed: all zero.
+  StreamStanding Standing(const std::string& channel) const {
+    const auto found = receivers_.find(channel);
+    return found != receivers_.end() ? found->second->standing() : StreamStanding{};
+  }
   // A message that the sender has announced is still to come, or to be given up. False for a channel never
   // subscribed.
   template <typename Message>
@@ -61,6 +81,7 @@ class StreamHub {
 
  private:
   StreamReceiver& Receiver(const std::string& channel);
+  void Hear(const std::string& channel, Bus::MessageHandler handler);
 
   Bus& bus_;
   StreamOptions options_;
@@ -68,6 +89,7 @@ class StreamHub {
   StreamSender sender_;
   std::map<std::string, std::unique_ptr<StreamReceiver>> receivers_;
   Bus::TimerId timer_;
+  std::vector<Bus::SubscriptionId> subscriptions_;
 };
 
 // Periodic state, where only the newest message counts: no sequence, no resend.
@@ -77,9 +99,9 @@ Status PublishState(Bus& bus, const StateChannel<Message>& channel, const Messag
 }
 // What does not decode is left out: the sender says it again within a second.
 template <typename Message>
-void SubscribeState(Bus& bus, const StateChannel<Message>& channel,
-                    std::function<void(const Message&)> handler) {
-  bus.Subscribe(channel.name, [handler = std::move(handler)](ByteView bytes) {
+Bus::SubscriptionId SubscribeState(Bus& bus, const StateChannel<Message>& channel,
+                                   std::function<void(const Message&)> handler) {
+  return bus.Subscribe(channel.name, [handler = std::move(handler)](ByteView bytes) {
     if (const Result<Message> message = Decode<Message>(bytes); message.ok()) {
       handler(*message);
     }

@@ -44,6 +44,9 @@ bool StreamReceiver::EnterSession(std::int64_t session, std::int64_t first_seque
   }
   if (session_ != 0) {
     left_.push_back(session_);
+  } else {
+    joined_session_ = session;
+    joined_at_ = from_the_start ? 1 : first_sequence_if_joining;
   }
   if (left_.size() > kSessionsLeftKept) {
     left_.pop_front();
@@ -149,6 +152,7 @@ void StreamReceiver::OnStatus(std::int64_t session, std::int64_t first, std::int
   if (!EnterSession(session, last + 1)) {
     return;
   }
+  told_us_ = bus_.NowUs();
   GiveUp(first);  // the sender no longer has what is older
   NoteUpTo(last);
   DeliverReady();

@@ -20,6 +20,18 @@
 
 namespace forgescan {
 
+// Where a receiver stands with its sender. Times are those of this process; 0 = never.
+struct StreamStanding {
+  std::int64_t session = 0;         // of the sender; 0 = no contact yet
+  std::int64_t joined_session = 0;  // the first one heard
+  std::int64_t joined_at = 0;  // its first message that can be delivered; what it sent before was not heard
+  std::int64_t heard_us = 0;   // last sign of life of the sender
+  std::int64_t told_us = 0;    // last time it said what it had sent
+  std::int64_t next = 1;       // sequence to be delivered next
+  std::int64_t announced = 0;  // last sequence known to have been sent and not delivered; 0 = none
+  bool waiting() const { return announced != 0; }
+};
+
 class StreamReceiver {
  public:
   using Handler = std::function<void(ByteView)>;
@@ -37,6 +49,11 @@ class StreamReceiver {
   // Asks for what is missing, gives up what is overdue. To be called every few ms.
   void OnTimer();
   bool waiting() const { return !waiting_.empty(); }
+  // In the lost handler `session` is that of the hole.
+  StreamStanding standing() const {
+    const std::int64_t announced = waiting_.empty() ? 0 : waiting_.rbegin()->first;
+    return {session_, joined_session_, joined_at_, heard_us_, told_us_, next_, announced};
+  }
 
  private:
   // A message from `next_` on that has not been delivered.
@@ -72,6 +89,9 @@ class StreamReceiver {
   std::deque<std::int64_t> left_;  // the last sessions before it, oldest first; never entered again
   std::int64_t next_ = 1;          // sequence to be delivered next
   std::int64_t heard_us_ = 0;      // last sign of life of the sender
+  std::int64_t told_us_ = 0;       // last status of the sender
+  std::int64_t joined_session_ = 0;
+  std::int64_t joined_at_ = 0;
   std::map<std::int64_t, Waiting> waiting_;
 };
 

@@ -21,6 +21,14 @@ StreamSender::StreamSender(Bus& bus, std::string sender, const StreamOptions& op
   ScheduleStatus(0);
 }
 
+StreamSender::~StreamSender() {
+  bus_.Cancel(status_timer_);
+  bus_.Cancel(piece_timer_);
+  if (!histories_.empty()) {
+    SendStatus();
+  }
+}
+
 Status StreamSender::Publish(const std::string& channel, Bytes message) {
   RETURN_IF_ERROR(CheckPublish(channel, message));
   History& history = histories_[channel];
@@ -121,7 +129,7 @@ void StreamSender::SendNextPiece() {
   queued_.erase(piece);
   SendPiece(piece);
   if (!queue_.empty()) {
-    bus_.At(bus_.NowUs() + options_.piece_gap_us, [this] { SendNextPiece(); });
+    piece_timer_ = bus_.At(bus_.NowUs() + options_.piece_gap_us, [this] { SendNextPiece(); });
   }
 }
 

@@ -19,6 +19,11 @@ class StreamSender {
  public:
   StreamSender(Bus& bus, std::string sender, const StreamOptions& options, StreamCounters& counters);
 
+  StreamSender(const StreamSender&) = delete;
+  StreamSender& operator=(const StreamSender&) = delete;
+  // Says a last time what was sent, so that a receiver notices a loss at the end.
+  ~StreamSender();
+
   std::int64_t session() const { return session_; }
   // Announces the channel before its first message, so that receivers know its beginning.
   void Advertise(const std::string& channel) { histories_[channel]; }
@@ -55,6 +60,7 @@ class StreamSender {
   std::deque<Piece> queue_;
   std::set<Piece> queued_;
   Bus::TimerId status_timer_ = 0;
+  Bus::TimerId piece_timer_ = 0;
   std::int64_t status_delay_us_;
 };
 

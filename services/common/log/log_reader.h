@@ -1,5 +1,5 @@
-// Reads an LCM event log, whole or damaged. LCM's own reader stops at the first bad byte, trusts lengths up to
-// 2 GB and takes a truncated log for a whole one; this one finds every event that is still there, and says
+// Reads an LCM event log, whole or damaged. LCM's own reader stops at the first bad byte, trusts lengths up
+// to 2 GB and takes a truncated log for a whole one; this one finds every event that is still there, and says
 // what lies between.
 //
 // Format (LCM 1.3.1): per event a header of 28 bytes, big-endian: sync word EDA1DA01, int64 event number,
@@ -21,9 +21,9 @@ namespace forgescan {
 
 // An event in the file.
 struct LogEntry {
-  std::uint64_t offset = 0;  // of its header
-  std::int64_t number = 0;   // as written
-  std::int64_t utime = 0;    // us since 1970 UTC of recording; not always in order
+  std::uint64_t offset = 0;   // of its header
+  std::int64_t number = 0;    // as written
+  std::int64_t utime = 0;     // us since 1970 UTC of recording; not always in order
   std::uint32_t channel = 0;  // index in LogReader::channels()
   std::uint32_t bytes = 0;    // of the message
 };
@@ -49,8 +49,8 @@ class LogReader {
   const std::vector<LogDamage>& damage() const { return damage_; }   // in file order; empty = whole
   const std::vector<std::string>& channels() const { return channels_; }
   const std::string& ChannelOf(const LogEntry& entry) const { return channels_[entry.channel]; }
-  // The message. Errors: kIo (the file has changed or cannot be read).
-  Result<Bytes> Read(const LogEntry& entry) const;
+  // The message, or at most its first bytes. Errors: kIo (the file has changed or cannot be read).
+  Result<Bytes> Read(const LogEntry& entry, std::size_t at_most = kMaxLogMessageBytes) const;
 
  private:
   LogReader(std::string path, int fd, std::uint64_t file_bytes);

@@ -31,8 +31,10 @@ class LogWriter {
   Status Write(std::string_view channel, std::int64_t utime, ByteView message);
   // What was written is on the disk when this returns. Errors: kIo.
   Status Sync();
-  // Sync(), then PATH.part becomes PATH. Errors: kIo.
-  Status Close();
+  // Sync(), then PATH.part becomes PATH. Errors: kIo (also when PATH exists meanwhile: nothing is replaced).
+  Status Close() { return CloseAs(std::string(path_)); }
+  // The same under another name in the same folder, known only now; path() is that name afterwards.
+  Status CloseAs(const std::string& path);
 
  private:
   LogWriter(std::string path, _lcm_eventlog_t* log);

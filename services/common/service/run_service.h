@@ -6,16 +6,15 @@
 #include <string>
 
 #include "services/common/bus/lcm_bus.h"
-#include "services/common/service/service_monitor.h"
-#include "services/common/service/station.h"
+#include "services/common/service/service_parts.h"
 
 namespace forgescan {
 
-struct ServiceContext {
-  const Station& station;
+struct ServiceContext : ServiceParts {
   LcmBus& bus;
-  StreamHub& hub;
-  ServiceMonitor& monitor;
+  // Called at SIGINT or SIGTERM. Stops the bus unless the factory puts something in its place that does so
+  // before long: a service that has work to end first.
+  std::function<void()>& stop;
 };
 
 // Makes the service on its concrete drivers; what it returns lives until the service stops.

@@ -71,9 +71,14 @@ void ServiceMonitor::Publish() {
   for (const auto& [name, value] : counters_) {
     state.counters.push_back({name, value});
   }
+  state.counters.push_back({"messages_received", streams.delivered});
+  state.counters.push_back({"messages_sent", streams.published});
   state.counter_count = static_cast<std::int32_t>(state.counters.size());
   // Sent again in a second, so a refusal needs no answer here.
   [[maybe_unused]] const Status sent = PublishState(hub_.bus(), kServiceState, state);
+  if (on_publish_) {
+    on_publish_(text_);
+  }
 }
 
 }  // namespace forgescan

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <string>
 
@@ -33,6 +34,8 @@ class ServiceMonitor {
   std::int64_t counter(const std::string& name) const;
 
   void SetState(ServiceState state, const std::string& text);
+  // Called with the line of text whenever the service speaks, for a supervisor outside the bus.
+  void OnPublish(std::function<void(const std::string& text)> handler) { on_publish_ = std::move(handler); }
   // Keeps the sentence as last error, writes it to the log and counts it under `errors`; the state stays as
   // it is.
   void ReportError(const Error& error);
@@ -50,6 +53,7 @@ class ServiceMonitor {
   std::string last_error_;
   std::map<std::string, std::int64_t> counters_;
   std::int64_t missing_told_ = 0;  // messages given up, as last published
+  std::function<void(const std::string&)> on_publish_;
   Bus::TimerId timer_;
   Bus::TimerId loss_timer_;
 };

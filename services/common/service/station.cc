@@ -24,7 +24,7 @@ Result<Station> Station::Load(const std::string& folder) {
   }
   RETURN_IF_ERROR(table.Finish());
   RETURN_IF_ERROR(file.OnlyTables({"station", "trigger", "camera", "robot", "cooling", "reconstruction",
-                                   "fusion", "registration", "report"}));
+                                   "fusion", "registration", "report", "recorder", "supervision"}));
   return station;
 }
 

@@ -9,9 +9,9 @@
 namespace forgescan {
 
 // The services of every station, by the names in their SERVICE_STATE.
-inline constexpr std::array<const char*, 9> kServiceNames = {"report",         "registration", "fusion",
-                                                             "reconstruction", "camera_left",  "camera_right",
-                                                             "cooling",        "trigger",      "robot"};
+inline constexpr std::array<const char*, 10> kServiceNames = {
+    "recorder",    "report",       "registration", "fusion",  "reconstruction",
+    "camera_left", "camera_right", "cooling",      "trigger", "robot"};
 
 struct Station {
   std::string folder;  // where station.toml is; relative paths in it start here

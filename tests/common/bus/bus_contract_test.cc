@@ -72,6 +72,20 @@ class BusContract : public ::testing::TestWithParam<Kind> {
 
 TEST_P(BusContract, Starts) { EXPECT_GT(pair_->a().NowUs(), 1'600'000'000'000'000); }
 
+TEST_P(BusContract, WhoHasUnsubscribedHearsNothingMore) {
+  int gone = 0, stays = 0;
+  const auto subscription = pair_->b().Subscribe("X", [&](ByteView) { ++gone; });
+  pair_->b().Subscribe("X", [&](ByteView) { ++stays; });
+  ASSERT_TRUE(pair_->a().Publish("X", Bytes{1}).ok());
+  ASSERT_TRUE(pair_->RunUntilTrue([&] { return stays == 1; }, kPatienceUs));
+  ASSERT_TRUE(pair_->a().Publish("X", Bytes{2}).ok());  // under way when it is unsubscribed
+  pair_->b().Unsubscribe(subscription);
+  pair_->b().Unsubscribe(subscription);  // again: nothing
+  ASSERT_TRUE(pair_->a().Publish("X", Bytes{3}).ok());
+  ASSERT_TRUE(pair_->RunUntilTrue([&] { return stays == 3; }, kPatienceUs));
+  EXPECT_EQ(gone, 1);
+}
+
 TEST_P(BusContract, DeliversToEverySubscriberItselfIncluded) {
   Bytes at_a, at_b;
   pair_->a().Subscribe("X", [&](ByteView bytes) { at_a.assign(bytes.begin(), bytes.end()); });

@@ -20,9 +20,10 @@ class SteppedBus final : public Bus {
   Status Publish(std::string_view channel, ByteView message) override {
     return bus_.Publish(channel, message);
   }
-  void Subscribe(const std::string& channel, MessageHandler handler) override {
-    bus_.Subscribe(channel, std::move(handler));
+  SubscriptionId Subscribe(const std::string& channel, MessageHandler handler) override {
+    return bus_.Subscribe(channel, std::move(handler));
   }
+  void Unsubscribe(SubscriptionId subscription) override { bus_.Unsubscribe(subscription); }
   TimerId At(std::int64_t utime, TimerHandler handler) override {
     return bus_.At(utime - step_us_, std::move(handler));
   }

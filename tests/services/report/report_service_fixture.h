@@ -83,12 +83,14 @@ inline fsmsg::fusion_result_t Fusion(int part) {
 
 class ReportServiceTest : public ::testing::Test {
  protected:
-  // services: of the station.
+  // services: of the station; none = the test starts the service itself.
   explicit ReportServiceTest(const std::vector<std::string>& services = {"report"}) {
     std::filesystem::remove_all(folder_);
     listener_.Subscribe<fsmsg::verdict_t>(kVerdict,
                                           [this](const auto& verdict) { verdicts_.push_back(verdict); });
-    Start(services);
+    if (!services.empty()) {
+      Start(services);
+    }
     network_.RunFor(kSecondUs);
   }
   ~ReportServiceTest() override {

@@ -2,11 +2,13 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <csignal>
 #include <cstdio>
 #include <ctime>
 #include <filesystem>
+#include <set>
 
 #include "services/common/bus/stream_hub.h"
 #include "services/common/model/bundle_file.h"
@@ -58,19 +60,30 @@ class Progress {
           ok ? fmt::format("rms {:.3f} mm, {:.0f} % foreign points", m.rms_mm, 100 * m.foreign_share)
              : "FAILED: " + m.reason);
     });
-    hub.Subscribe<fsmsg::verdict_t>(kVerdict, [this](const auto& m) {
-      Say(m.part, "verdict {}{}{}", VerdictName(m.verdict), m.reason.empty() ? "" : ": ", m.reason);
-      verdicts_.push_back(m);
-    });
-    hub.Subscribe<fsmsg::part_sorted_t>(kPartSorted,
-                                        [this](const auto& m) { sorted_ += m.acknowledged == 1 ? 1 : 0; });
+    hub.Subscribe<fsmsg::verdict_t>(kVerdict, [this](const auto& m) { NoteVerdict(m); });
+    hub.Subscribe<fsmsg::part_sorted_t>(kPartSorted, [this](const auto& m) { NoteSorted(m); });
   }
 
   const std::vector<fsmsg::verdict_t>& verdicts() const { return verdicts_; }
-  int sorted() const { return sorted_; }
+  int sorted() const { return static_cast<int>(sorted_.size()); }
   double Seconds() const { return static_cast<double>(hub_.bus().NowUs() - start_us_) * 1e-6; }
 
  private:
+  void NoteSorted(const fsmsg::part_sorted_t& m) {
+    if (m.acknowledged == 1) {
+      sorted_.insert(m.part);
+    }
+  }
+  // A verdict is said again where a service that was started anew may have missed it.
+  void NoteVerdict(const fsmsg::verdict_t& m) {
+    const bool again = std::any_of(verdicts_.begin(), verdicts_.end(), [&m](const auto& earlier) {
+      return earlier.part == m.part && earlier.utime == m.utime;
+    });
+    if (!again) {
+      Say(m.part, "verdict {}{}{}", VerdictName(m.verdict), m.reason.empty() ? "" : ": ", m.reason);
+      verdicts_.push_back(m);
+    }
+  }
   static const char* VerdictName(int verdict) {
     constexpr const char* kNames[] = {"UNKNOWN", "OK", "NOT_OK", "NOT_DECIDABLE", "NOT_INSPECTED"};
     return verdict >= 0 && verdict < 5 ? kNames[verdict] : "UNKNOWN";
@@ -85,7 +98,7 @@ class Progress {
   std::int64_t start_us_;
   StreamHub& hub_;
   std::vector<fsmsg::verdict_t> verdicts_;
-  int sorted_ = 0;
+  std::set<int> sorted_;  // parts
 };
 
 Result<fs::path> MakeRunFolder(const std::string& base) {
@@ -106,11 +119,9 @@ Result<fs::path> MakeRunFolder(const std::string& base) {
   return Fail(ErrorCode::kIo, "no new folder can be made in {}", base);
 }
 
-// Returns the verdicts, when the line has sorted every part.
-Result<std::vector<fsmsg::verdict_t>> InspectParts(StationRunner& runner, ProcessGroup& cell,
-                                                   const InspectOptions& options, const fs::path& run) {
-  StreamHub hub(runner.bus(), "inspect");
-  const Progress progress(hub);
+// Returns when the line has sorted every part.
+Status InspectParts(StationRunner& runner, ProcessGroup& cell, const InspectOptions& options,
+                    const fs::path& run, const Progress& progress) {
   const Interrupt interrupt;
   if (const int bytes = runner.bus().Health().receive_buffer_bytes; bytes < kWantedReceiveBufferBytes) {
     fmt::print(
@@ -136,12 +147,13 @@ Result<std::vector<fsmsg::verdict_t>> InspectParts(StationRunner& runner, Proces
       return Fail(ErrorCode::kTimeout, "{} of {} parts were sorted within {} s; {} has the logs",
                   progress.sorted(), options.parts, patience_us / 1'000'000, run.string());
     }
-    if (const std::string ended = cell.Ended(); !ended.empty() && progress.sorted() < options.parts) {
-      return Fail(ErrorCode::kUnavailable, "{}", ended);
+    if (const auto ended = cell.Ended(); ended.has_value() && progress.sorted() < options.parts) {
+      return Fail(ErrorCode::kUnavailable, "{} {}", ended->service, ended->Text());
     }
   }
-  fmt::print("\n{}\ninspection took {:.0f} s\n", runner.Table(140, false), progress.Seconds());
-  return progress.verdicts();
+  fmt::print("\n{}\ninspection took {:.0f} s, {} restarts\n", runner.Table(140, false), progress.Seconds(),
+             runner.restarts());
+  return {};
 }
 
 Status Prepare(const InspectOptions& options, const fs::path& run) {
@@ -165,20 +177,19 @@ Status Prepare(const InspectOptions& options, const fs::path& run) {
 }
 
 Status Inspect(const InspectOptions& options) {
-  if (!HasMulticastRoute()) {
-    RETURN_IF_ERROR(EnterPrivateNetwork());
-  }
+  RETURN_IF_ERROR(EnsureNetwork(options.station));
   ASSIGN_OR_RETURN(const fs::path run, MakeRunFolder(options.out));
   RETURN_IF_ERROR(Prepare(options, run));
   ProcessGroup cell((run / "log").string());
-  ASSIGN_OR_RETURN(const auto runner, StationRunner::Start((run / "station").string()));
-  const auto verdicts = InspectParts(*runner, cell, options, run);
-  runner->Stop();  // the report service writes the pages that are still due
+  ASSIGN_OR_RETURN(const auto runner, StationRunner::Create((run / "station").string(), Echo::kTroubles));
+  StreamHub hub(runner->bus(), "inspect");  // listens until the bus is silent
+  const Progress progress(hub);
+  const Status inspected = InspectParts(*runner, cell, options, run, progress);
+  const Status stopped = runner->Stop();  // the report service writes the pages that are still due
   cell.Stop();
-  if (!verdicts.ok()) {
-    return verdicts.error();
-  }
-  return ShowOutcome(run, runner->station().results, *verdicts, options.parts);
+  RETURN_IF_ERROR(inspected);
+  RETURN_IF_ERROR(stopped);
+  return ShowOutcome(run, runner->station().results, progress.verdicts(), options.parts);
 }
 
 }  // namespace

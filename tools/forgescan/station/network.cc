@@ -15,13 +15,18 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 
 namespace forgescan {
 namespace {
 
-// LCM's default group, and python-can's for CAN over UDP.
-constexpr const char* kGroups[] = {"239.255.76.67", "239.74.163.2"};
+// The host part of "SCHEME...HOST:PORT..."; empty if the URL has another scheme.
+std::string HostOf(const std::string& url, const std::string& scheme) {
+  const std::size_t end = url.find(':', scheme.size());
+  return url.starts_with(scheme) && end != std::string::npos ? url.substr(scheme.size(), end - scheme.size())
+                                                             : std::string();
+}
 
 class Socket {
  public:
@@ -126,15 +131,36 @@ Status MapUser(uid_t uid, gid_t gid) {
 
 }  // namespace
 
-bool HasMulticastRoute() {
-  return std::all_of(std::begin(kGroups), std::end(kGroups), [](const char* group) {
+std::vector<std::string> GroupsOf(const Station& station) {
+  std::vector<std::string> groups{HostOf(station.bus_url, "udpm://"), HostOf(station.can_url, "udp:")};
+  std::erase(groups, std::string());
+  return groups;
+}
+
+bool HasMulticastRoute(const std::vector<std::string>& groups) {
+  return std::all_of(groups.begin(), groups.end(), [](const std::string& group) {
     const Netlink netlink;
-    return netlink.AskRouteTo(Address(group).sin_addr) &&
+    return netlink.AskRouteTo(Address(group.c_str()).sin_addr) &&
            netlink.AnsweredDevice() == static_cast<int>(if_nametoindex("lo"));
   });
 }
 
-Status EnterPrivateNetwork() {
+Status EnsureNetwork(const std::string& folder) {
+  ASSIGN_OR_RETURN(const Station station, Station::Load(folder));
+  const std::vector<std::string> groups = GroupsOf(station);
+  if (HasMulticastRoute(groups)) {
+    return {};
+  }
+  if (!station.can_url.starts_with("udp:")) {
+    return Fail(
+        ErrorCode::kUnavailable,
+        "station {}: the bus's group is not routed to loopback; ip route add {}/32 dev lo, once a boot",
+        station.name, groups.empty() ? "GROUP" : groups.front());
+  }
+  return EnterPrivateNetwork(groups);
+}
+
+Status EnterPrivateNetwork(const std::vector<std::string>& groups) {
   const uid_t uid = getuid();
   const gid_t gid = getgid();
   const int kinds = uid == 0 ? CLONE_NEWNET : CLONE_NEWUSER | CLONE_NEWNET;
@@ -146,14 +172,20 @@ Status EnterPrivateNetwork() {
   }
   const Socket socket;
   RETURN_IF_ERROR(RaiseLoopback(socket.fd()));
-  for (const char* group : kGroups) {
-    RETURN_IF_ERROR(RouteToLoopback(socket.fd(), group));
+  for (const std::string& group : groups) {
+    RETURN_IF_ERROR(RouteToLoopback(socket.fd(), group.c_str()));
   }
   return {};
 }
 
 Status JoinNetworkOf(int pid) {
   const std::string base = "/proc/" + std::to_string(pid) + "/ns/";
+  std::error_code not_running;
+  if (std::filesystem::read_symlink(base + "net", not_running) ==
+          std::filesystem::read_symlink("/proc/self/ns/net", not_running) &&
+      !not_running) {
+    return {};
+  }
   for (const auto& [kind, flag] : {std::pair{"user", CLONE_NEWUSER}, std::pair{"net", CLONE_NEWNET}}) {
     const int fd = open((base + kind).c_str(), O_RDONLY | O_CLOEXEC);
     if (fd < 0) {

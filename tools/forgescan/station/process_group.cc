@@ -7,6 +7,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <csignal>
 #include <cstring>
@@ -18,13 +19,12 @@ namespace {
 
 constexpr int kStopPatienceMs = 10'000;
 
-std::string Fate(int status) {
-  return WIFSIGNALED(status) ? fmt::format("was killed by signal {}", WTERMSIG(status))
-                             : fmt::format("ended with exit code {}", WEXITSTATUS(status));
-}
-
+// Of the end of the file: a log may have grown for weeks.
 std::string LastLine(const std::string& path) {
-  std::ifstream stream(path);
+  constexpr std::streamoff kTailBytes = 4096;
+  std::ifstream stream(path, std::ios::binary | std::ios::ate);
+  const std::streamoff size = stream.tellg();
+  stream.seekg(std::max<std::streamoff>(0, size - kTailBytes));
   std::string last;
   for (std::string line; std::getline(stream, line);) {
     last = line.empty() ? last : line;
@@ -74,17 +74,40 @@ Status ProcessGroup::Start(const std::string& name, const std::vector<std::strin
   return {};
 }
 
-std::string ProcessGroup::Ended() {
+ProcessEnd ProcessGroup::EndOf(const Process& process, int status) const {
+  const bool killed = WIFSIGNALED(status);
+  return {process.name, !killed, killed ? WTERMSIG(status) : WEXITSTATUS(status),
+          LastLine(LogOf(process.name))};
+}
+
+std::optional<ProcessEnd> ProcessGroup::Ended() {
   for (auto process = processes_.begin(); process != processes_.end(); ++process) {
     int status = 0;
     if (waitpid(process->pid, &status, WNOHANG) == process->pid) {
-      const std::string text =
-          fmt::format("{} {}: {}", process->name, Fate(status), LastLine(LogOf(process->name)));
+      ProcessEnd end = EndOf(*process, status);
       processes_.erase(process);
-      return text;
+      return end;
     }
   }
-  return {};
+  return std::nullopt;
+}
+
+pid_t ProcessGroup::PidOf(const std::string& name) const {
+  for (const Process& process : processes_) {
+    if (process.name == name) {
+      return process.pid;
+    }
+  }
+  return 0;
+}
+
+bool ProcessGroup::Reaped(const std::string& name) {
+  const pid_t pid = PidOf(name);
+  if (pid != 0 && waitpid(pid, nullptr, WNOHANG) != pid) {
+    return false;
+  }
+  std::erase_if(processes_, [&](const Process& process) { return process.name == name; });
+  return true;
 }
 
 Status ProcessGroup::WaitForSuccess() {
@@ -97,11 +120,16 @@ Status ProcessGroup::WaitForSuccess() {
     } while (ended < 0 && errno == EINTR);
     processes_.pop_back();
     if (ended != process.pid || status != 0) {
-      return Fail(ErrorCode::kUnavailable, "{} {}: {}", process.name, Fate(status),
-                  LastLine(LogOf(process.name)));
+      return Fail(ErrorCode::kUnavailable, "{} {}", process.name, EndOf(process, status).Text());
     }
   }
   return {};
+}
+
+void ProcessGroup::Signal(const std::string& name, int signal) const {
+  if (const pid_t pid = PidOf(name); pid != 0) {
+    kill(pid, signal);
+  }
 }
 
 void ProcessGroup::Signal(int signal) const {

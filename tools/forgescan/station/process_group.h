@@ -3,10 +3,12 @@
 
 #include <sys/types.h>
 
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "services/common/result.h"
+#include "tools/forgescan/station/supervisor.h"
 
 namespace forgescan {
 
@@ -20,13 +22,18 @@ class ProcessGroup {
 
   // Errors: kIo (no such program, no log file).
   Status Start(const std::string& name, const std::vector<std::string>& command);
-  // Name, fate and last words of the first process that has ended since the last call; empty = all run.
-  std::string Ended();
+  // The first process that has ended and was not told of; nothing = all run.
+  std::optional<ProcessEnd> Ended();
+  // 0 = no such process, or it has ended.
+  pid_t PidOf(const std::string& name) const;
   // Waits for all to end by themselves. Errors: kUnavailable (one failed; the end of its log is in the
   // sentence).
   Status WaitForSuccess();
-  // Sends a signal to all.
+  // Sends a signal to all, or to one.
   void Signal(int signal) const;
+  void Signal(const std::string& name, int signal) const;
+  // True once the process has ended; it is then forgotten.
+  bool Reaped(const std::string& name);
   // SIGTERM to one after the other, last started first; SIGKILL for one that has not ended after 10 s.
   void Stop();
 
@@ -36,6 +43,7 @@ class ProcessGroup {
     pid_t pid;
   };
   static bool WaitForEnd(pid_t pid);
+  ProcessEnd EndOf(const Process& process, int status) const;
   std::string LogOf(const std::string& name) const { return log_folder_ + "/" + name + ".log"; }
 
   std::string log_folder_;

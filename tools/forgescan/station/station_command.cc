@@ -1,68 +1,29 @@
-// forgescan station up|down|status FOLDER
-#include <fcntl.h>
-#include <sys/file.h>
+// forgescan station up|down|status|units FOLDER
 #include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <csignal>
 #include <cstdio>
-#include <filesystem>
-#include <fstream>
 
+#include "services/common/bus/stream_hub.h"
 #include "tools/forgescan/command.h"
 #include "tools/forgescan/station/interrupt.h"
 #include "tools/forgescan/station/network.h"
 #include "tools/forgescan/station/station_runner.h"
-#include "tools/forgescan/station/station_services.h"
+#include "tools/forgescan/station/station_units.h"
 
 namespace forgescan {
 namespace {
 
-constexpr std::int64_t kReadyPatienceUs = 30'000'000;
+constexpr std::int64_t kReadyPatienceUs = 60'000'000;
 constexpr std::int64_t kStatusListenUs = 2'500'000;  // every service speaks once a second
 constexpr std::int64_t kRedrawUs = 1'000'000;
+constexpr int kDownPatienceS = 150;  // longest stop with the default policy: draining, then nine services
 
-std::string PidFile(const std::string& folder) {
-  return (std::filesystem::path(folder) / "station.pid").string();
-}
-
-// The process that runs the station: it holds a lock on its file, so a file left behind by a crash names
-// nobody. Errors: kNotFound (none does).
-Result<int> RunningPid(const std::string& folder) {
-  int pid = 0;
-  std::ifstream(PidFile(folder)) >> pid;
-  const int fd = open(PidFile(folder).c_str(), O_RDONLY | O_CLOEXEC);
-  const bool locked = fd >= 0 && flock(fd, LOCK_EX | LOCK_NB) != 0;
-  close(fd);
-  if (!locked || pid <= 0) {
-    return Fail(ErrorCode::kNotFound, "station {} is not up", folder);
-  }
-  return pid;
-}
-
-// Held by `station up` while it runs.
-class PidLock {
- public:
-  explicit PidLock(const std::string& folder)
-      : path_(PidFile(folder)), fd_(open(path_.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0644)) {
-    const std::string pid = std::to_string(getpid()) + "\n";
-    held_ = fd_ >= 0 && flock(fd_, LOCK_EX | LOCK_NB) == 0 &&
-            write(fd_, pid.data(), pid.size()) == static_cast<ssize_t>(pid.size());
-  }
-  ~PidLock() {
-    if (held_) {
-      std::filesystem::remove(path_);
-    }
-    close(fd_);
-  }
-  PidLock(const PidLock&) = delete;
-  PidLock& operator=(const PidLock&) = delete;
-  bool held() const { return held_; }
-
- private:
-  std::string path_;
-  int fd_;
-  bool held_ = false;
+struct StationOptions {
+  std::string folder;
+  bool json = false;
+  UnitOptions units;
 };
 
 int TerminalWidth() {
@@ -70,76 +31,103 @@ int TerminalWidth() {
   return ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : 140;
 }
 
-Status Watch(StationRunner& runner, const Interrupt& interrupt) {
-  const bool terminal = isatty(STDOUT_FILENO) != 0;
-  while (!interrupt.Requested()) {
-    RETURN_IF_ERROR(runner.RunFor(kRedrawUs));
-    if (terminal) {
-      std::printf("\x1b[H\x1b[2Jstation %s (Ctrl-C stops it)\n%s", runner.station().name.c_str(),
-                  runner.Table(TerminalWidth(), true).c_str());
+// Redraws the table, or waits for the station to be ready and says so once.
+class Watch {
+ public:
+  explicit Watch(StationRunner& runner)
+      : runner_(runner), terminal_(isatty(STDOUT_FILENO) != 0), since_us_(runner.bus().NowUs()) {}
+
+  void Look() {
+    if (terminal_) {
+      std::printf("\x1b[H\x1b[2Jstation %s (Ctrl-C stops it)\n%s", runner_.station().name.c_str(),
+                  runner_.Table(TerminalWidth(), true).c_str());
       std::fflush(stdout);
     }
+    const bool late = runner_.bus().NowUs() - since_us_ > kReadyPatienceUs;
+    if (!told_ && runner_.AllReady()) {
+      runner_.log().Write("station", "is up");
+      told_ = true;
+    } else if (!told_ && late) {  // devices may be switched on later
+      runner_.log().Write("station", "is not ready yet:\n" + runner_.Table(100, false), true);
+      told_ = true;
+    }
   }
-  return {};
-}
 
-Status Up(const std::string& folder) {
-  if (RunningPid(folder).ok()) {
-    return Fail(ErrorCode::kInvalidArgument, "station {} is up already; forgescan station down {} stops it",
-                folder, folder);
-  }
+ private:
+  StationRunner& runner_;
+  bool terminal_;
+  std::int64_t since_us_;
+  bool told_ = false;
+};
+
+Status Up(const StationOptions& options) {
   const Interrupt interrupt;
-  if (!HasMulticastRoute()) {
-    RETURN_IF_ERROR(EnterPrivateNetwork());
+  RETURN_IF_ERROR(EnsureNetwork(options.folder));
+  const Echo echo = isatty(STDOUT_FILENO) != 0 ? Echo::kNothing : Echo::kAll;
+  ASSIGN_OR_RETURN(const auto runner, StationRunner::Create(options.folder, echo));
+  Watch watch(*runner);
+  Status status;
+  while (status.ok() && !interrupt.Requested()) {
+    status = runner->RunFor(kRedrawUs);
+    watch.Look();
   }
-  const PidLock lock(folder);
-  if (!lock.held()) {
-    return Fail(ErrorCode::kIo, "{} cannot be written", PidFile(folder));
-  }
-  ASSIGN_OR_RETURN(const auto runner, StationRunner::Start(folder));
-  Status status = runner->WaitUntilReady(kReadyPatienceUs);
-  if (status.ok()) {
-    std::printf("station %s is up\n", runner->station().name.c_str());
-    std::fflush(stdout);
-    status = Watch(*runner, interrupt);
-  }
-  runner->Stop();
-  return status;
+  const Status stopped = runner->Stop();
+  return status.ok() ? stopped : status;
 }
 
-Status Down(const std::string& folder) {
-  ASSIGN_OR_RETURN(const int pid, RunningPid(folder));
-  kill(pid, SIGTERM);
-  constexpr int kPatienceSteps = 600;
-  for (int step = 0; step < kPatienceSteps; ++step) {
-    if (!RunningPid(folder).ok()) {
-      std::printf("station %s is down\n", folder.c_str());
+Status Down(const StationOptions& options) {
+  ASSIGN_OR_RETURN(const StationProcesses station, RunningStation(options.folder));
+  kill(station.pid, SIGTERM);
+  constexpr int kStepsPerS = 10;
+  for (int step = 0; step < kDownPatienceS * kStepsPerS; ++step) {
+    if (!RunningStation(options.folder).ok()) {
+      std::printf("station %s is down\n", options.folder.c_str());
       return {};
     }
-    usleep(100'000);
+    usleep(1'000'000 / kStepsPerS);
   }
-  return Fail(ErrorCode::kTimeout, "station {} (process {}) has not stopped within 60 s", folder, pid);
+  return Fail(ErrorCode::kTimeout, "station {} (process {}) has not stopped within {} s", options.folder,
+              station.pid, kDownPatienceS);
 }
 
-Status ShowStatus(const std::string& folder) {
-  ASSIGN_OR_RETURN(const int pid, RunningPid(folder));
-  if (!HasMulticastRoute()) {
-    RETURN_IF_ERROR(JoinNetworkOf(pid));
-  }
-  ASSIGN_OR_RETURN(const Station station, Station::Load(folder));
+Status ShowStatus(const StationOptions& options) {
+  ASSIGN_OR_RETURN(const StationProcesses running, RunningStation(options.folder));
+  ASSIGN_OR_RETURN(const Station station, Station::Load(options.folder));
+  RETURN_IF_ERROR(JoinNetworkOf(running.pid));
   ASSIGN_OR_RETURN(const auto bus, LcmBus::Open(station.bus_url));
   const StateTable table(*bus);
+  ProcessUsage usage;
+  std::vector<std::string> names;
+  std::vector<TableRow> rows;
+  for (const StationService& service : StationServices()) {
+    const auto found = running.services.find(service.name);
+    const ServiceProcess process = found == running.services.end() ? ServiceProcess{} : found->second;
+    static_cast<void>(usage.Of(process.pid, bus->NowUs()));  // the processor's share is of the time from here
+    names.push_back(service.name);
+    rows.push_back({.service = service.name, .usage = {}, .restarts = process.restarts, .given_up = false});
+  }
   const std::int64_t until_us = bus->NowUs() + kStatusListenUs;
   while (bus->NowUs() < until_us) {
     RETURN_IF_ERROR(bus->RunOnce(until_us - bus->NowUs()));
   }
-  std::vector<std::string> names;
-  for (const StationService& service : StationServices()) {
-    names.push_back(service.name);
+  for (TableRow& row : rows) {
+    const auto found = running.services.find(row.service);
+    row.usage = found == running.services.end() ? std::nullopt : usage.Of(found->second.pid, bus->NowUs());
   }
-  std::printf("station %s\n%s", station.name.c_str(),
-              table.Render(names, TerminalWidth(), isatty(STDOUT_FILENO) != 0).c_str());
+  if (options.json) {
+    std::printf("%s\n", table.Json(rows).c_str());
+  } else {
+    std::printf("station %s\n%s", station.name.c_str(),
+                table.Render(rows, TerminalWidth(), isatty(STDOUT_FILENO) != 0).c_str());
+  }
   return table.AllReady(names) ? Status() : Fail(ErrorCode::kUnavailable, "not every service is ready");
+}
+
+Status WriteUnits(const StationOptions& options) {
+  UnitOptions units = options.units;
+  units.folder = options.folder;
+  units.programs = ProgramFolder();
+  return WriteStationUnits(units);
 }
 
 }  // namespace
@@ -147,17 +135,22 @@ Status ShowStatus(const std::string& folder) {
 void AddStationCommand(CLI::App& app, Status& outcome) {
   CLI::App* station = app.add_subcommand("station", "start, stop and look at the services of a station");
   station->require_subcommand(1);
-  static std::string folder;
-  const auto add = [&](const char* name, const char* what, Status (*run)(const std::string&)) {
+  static StationOptions options;
+  const auto add = [&](const char* name, const char* what, Status (*run)(const StationOptions&)) {
     CLI::App* command = station->add_subcommand(name, what);
-    command->add_option("FOLDER", folder, "the station's folder, with station.toml")
+    command->add_option("FOLDER", options.folder, "the station's folder, with station.toml")
         ->required()
         ->check(CLI::ExistingDirectory);
-    command->callback([&outcome, run] { outcome = run(folder); });
+    command->callback([&outcome, run] { outcome = run(options); });
+    return command;
   };
-  add("up", "start the services and show them until Ctrl-C or `station down`", Up);
-  add("down", "stop the services in order", Down);
-  add("status", "show what every service says of itself", ShowStatus);
+  add("up", "start the services, keep them running and show them until Ctrl-C or `station down`", Up);
+  add("down", "stop the services in order, once the parts in work are judged", Down);
+  add("status", "show what every service says of itself", ShowStatus)
+      ->add_flag("--json", options.json, "for other programs");
+  CLI::App* units = add("units", "write systemd units that run the station in production", WriteUnits);
+  units->add_option("--out", options.units.out, "folder for the unit files")->required();
+  units->add_option("--user", options.units.user, "account the services run under")->capture_default_str();
 }
 
 }  // namespace forgescan

@@ -1,4 +1,4 @@
-// A running station: its processes, its bus, and what its services say.
+// A running station: its processes under supervision, its bus, and what its services say.
 #pragma once
 
 #include <memory>
@@ -8,32 +8,73 @@
 #include "services/common/bus/lcm_bus.h"
 #include "services/common/service/station.h"
 #include "tools/forgescan/station/process_group.h"
+#include "tools/forgescan/station/process_usage.h"
 #include "tools/forgescan/station/state_table.h"
+#include "tools/forgescan/station/station_lock.h"
+#include "tools/forgescan/station/station_services.h"
+#include "tools/forgescan/station/supervisor.h"
+#include "tools/forgescan/station/supervisor_log.h"
 
 namespace forgescan {
 
 class StationRunner {
  public:
-  // Opens the bus of the station in FOLDER and starts its services; logs go to FOLDER/log.
-  static Result<std::unique_ptr<StationRunner>> Start(const std::string& folder);
+  // Opens the bus of the station in FOLDER, and takes its lock; RunFor() starts the services. Logs go to
+  // FOLDER/log. Errors: as Station::Load, SupervisionPolicy::Load, StationLock::Take, LcmBus::Open.
+  static Result<std::unique_ptr<StationRunner>> Create(const std::string& folder, Echo echo);
 
-  // Errors: kUnavailable with the service that ended or did not become ready in time.
+  // Every service is ready or working.
+  bool AllReady() const { return table_.AllReady(names_); }
+  // Errors: kUnavailable with the table, when a service did not become ready in time; as RunFor().
   Status WaitUntilReady(std::int64_t patience_us);
-  // Handles what arrives on the bus for a while. Errors: kUnavailable (a service ended).
+  // Handles what arrives on the bus for a while, and starts again what has ended or fallen silent. Errors:
+  // kUnavailable (a service cannot work on this station, or was given up and the policy is to stop then).
   Status RunFor(std::int64_t duration_us);
-  void Stop() { processes_.Stop(); }
+  // Stops makers of parts first, the computing services when the parts in work have their verdict, the
+  // recorder last. Errors: kUnavailable, naming what was given up before or had to be killed now.
+  Status Stop();
 
   LcmBus& bus() { return *bus_; }
   const Station& station() const { return station_; }
-  std::string Table(int width, bool colour) const { return table_.Render(names_, width, colour); }
+  int restarts() const { return supervisor_.restarts(); }
+  SupervisorLog& log() { return log_; }
+  // One row a service, for StateTable::Render.
+  std::vector<TableRow> Rows();
+  std::string Table(int width, bool colour) { return table_.Render(Rows(), width, colour); }
 
  private:
-  StationRunner(Station station, std::unique_ptr<LcmBus> bus);
+  struct Parts {
+    Station station;
+    SupervisionPolicy policy;
+    StationLock lock;
+    SupervisorLog log;
+    std::unique_ptr<LcmBus> bus;
+  };
+  explicit StationRunner(Parts parts);
+
+  Status Step();
+  void Carry(const Supervisor::Actions& actions);
+  void Do(const StartProcess& start);
+  void Do(const KillProcess& kill);
+  void Do(const SupervisorEvent& event);
+  std::map<std::string, ServiceProcess> Processes() const;
+  void Drain();
+  void StopStage(StationStage stage);
+  void StopOne(const std::string& name);
+  // Until the condition holds, handling what arrives on the bus. False: not within that time.
+  template <typename Condition>
+  bool WaitFor(double patience_s, const Condition& condition);
 
   Station station_;
+  SupervisionPolicy policy_;
+  StationLock lock_;
+  SupervisorLog log_;
   std::unique_ptr<LcmBus> bus_;
   StateTable table_;
   std::vector<std::string> names_;
+  Supervisor supervisor_;
+  ProcessUsage usage_;
+  std::vector<std::string> killed_;  // while stopping
   ProcessGroup processes_;
 };
 

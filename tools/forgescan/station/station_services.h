@@ -6,23 +6,29 @@
 
 namespace forgescan {
 
+// Stages are started one after the other, consumers before producers, and stopped the other way round: who
+// makes parts first, who computes once the parts in work have their verdict, who records last.
+enum StationStage : int { kRecording, kComputing, kSensing, kMoving };
+
 struct StationService {
   std::string name;                    // as in its SERVICE_STATE
   std::string program;                 // beside the forgescan tool
   std::vector<std::string> arguments;  // before --station FOLDER
+  StationStage stage = kRecording;
 };
 
-// Consumers before producers, so that nothing is sent to nobody.
+// Stages ascend.
 inline std::vector<StationService> StationServices() {
-  return {{"report", "forgescan-report", {}},
-          {"registration", "forgescan-registration", {}},
-          {"fusion", "forgescan-fusion", {}},
-          {"reconstruction", "forgescan-reconstruction", {}},
-          {"camera_left", "forgescan-camera", {"left"}},
-          {"camera_right", "forgescan-camera", {"right"}},
-          {"cooling", "forgescan-cooling", {}},
-          {"trigger", "forgescan-trigger", {}},
-          {"robot", "forgescan-robot", {}}};
+  return {{"recorder", "forgescan-recorder", {}, kRecording},
+          {"report", "forgescan-report", {}, kComputing},
+          {"registration", "forgescan-registration", {}, kComputing},
+          {"fusion", "forgescan-fusion", {}, kComputing},
+          {"reconstruction", "forgescan-reconstruction", {}, kComputing},
+          {"camera_left", "forgescan-camera", {"left"}, kSensing},
+          {"camera_right", "forgescan-camera", {"right"}, kSensing},
+          {"cooling", "forgescan-cooling", {}, kSensing},
+          {"trigger", "forgescan-trigger", {}, kMoving},
+          {"robot", "forgescan-robot", {}, kMoving}};
 }
 
 }  // namespace forgescan

@@ -1,0 +1,91 @@
+// A small recording written by a test, as the recorder would write it.
+#pragma once
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "services/common/bus/channels.h"
+#include "services/common/bus/codec.h"
+#include "services/common/bus/stream_header.h"
+#include "services/common/log/log_writer.h"
+
+namespace forgescan::testing {
+
+inline constexpr std::int64_t kSession = 1'700'000'000'000'000;
+
+// A folder that goes with the test.
+class TestFolder {
+ public:
+  TestFolder() : path_(std::filesystem::path(::testing::TempDir()) / UniqueName()) {
+    std::filesystem::remove_all(path_);
+    std::filesystem::create_directories(path_);
+  }
+  ~TestFolder() { std::filesystem::remove_all(path_); }
+  const std::filesystem::path& path() const { return path_; }
+  std::string operator/(const std::string& name) const { return (path_ / name).string(); }
+
+ private:
+  static std::string UniqueName() {
+    const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
+    return "forgescan_" + std::to_string(getpid()) + "_" + (test != nullptr ? test->name() : "suite");
+  }
+  std::filesystem::path path_;
+};
+
+class WrittenRecording {
+ public:
+  explicit WrittenRecording(const std::string& path, const std::string& station = "test")
+      : writer_(LogWriter::Create(path)) {
+    EXPECT_TRUE(writer_.ok()) << writer_.error().message;
+    fsmsg::recording_opened_t opened{};
+    opened.utime = kSession;
+    opened.station = station;
+    Write(kRecordingOpened.name, Encode(opened), kSession);
+  }
+
+  void File(const std::string& name, const std::string& text) {
+    fsmsg::recorded_file_t file{};
+    file.name = name;
+    file.data.assign(text.begin(), text.end());
+    file.size = static_cast<std::int32_t>(file.data.size());
+    Write(kRecordedFile.name, Encode(file), kSession);
+  }
+
+  // Returns the message as it was written.
+  template <typename Message>
+  Bytes Stream(const Channel<Message>& channel, const Message& message, std::int64_t sequence) {
+    Bytes bytes = Encode(message);
+    EXPECT_TRUE(StampStreamHeader(bytes, {kSession, sequence}).ok());
+    Write(channel.name, bytes, message.utime);
+    return bytes;
+  }
+
+  template <typename Message>
+  void State(const StateChannel<Message>& channel, const Message& message) {
+    Write(channel.name, Encode(message), message.utime);
+  }
+
+  void Write(const char* channel, const Bytes& message, std::int64_t utime) {
+    const Status written = writer_->Write(channel, utime, message);
+    EXPECT_TRUE(written.ok()) << written.error().message;
+  }
+
+  void Close(std::vector<fsmsg::recording_gap_t> gaps = {}) {
+    fsmsg::recording_closed_t closed{};
+    closed.gaps = std::move(gaps);
+    closed.gap_count = static_cast<std::int32_t>(closed.gaps.size());
+    Write(kRecordingClosed.name, Encode(closed), kSession);
+    const Status done = writer_->Close();
+    EXPECT_TRUE(done.ok()) << done.error().message;
+  }
+
+ private:
+  Result<LogWriter> writer_;
+};
+
+}  // namespace forgescan::testing

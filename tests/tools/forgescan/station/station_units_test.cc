@@ -1,0 +1,120 @@
+// The systemd units of a station: complete, in order, and to systemd's own checker without a word of blame.
+#include "tools/forgescan/station/station_units.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <array>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <map>
+
+#include "tools/forgescan/station/station_services.h"
+
+namespace forgescan {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+std::map<std::string, std::string> TextsOf(const std::string& can_url) {
+  Station station;
+  station.name = "cell-1";
+  station.bus_url = "udpm://239.255.76.67:7667?ttl=0";
+  station.can_url = can_url;
+  station.results = "/srv/cell-1/results";
+  const UnitOptions options{"/srv/cell-1", "/opt/forgescan/bin", "forgescan", ""};
+  std::map<std::string, std::string> texts;
+  const auto units = MakeUnits(station, {}, options);
+  EXPECT_TRUE(units.ok());
+  for (const UnitFile& unit : units.ok() ? *units : std::vector<UnitFile>{}) {
+    texts[unit.name] = unit.text;
+  }
+  return texts;
+}
+
+TEST(StationUnits, OneAServiceATargetAndARoute) {
+  const auto texts = TextsOf("socketcan:can0");
+  EXPECT_EQ(texts.size(), 2 + StationServices().size());
+  const std::string robot = texts.at("forgescan-cell-1-robot.service");
+  EXPECT_THAT(robot, HasSubstr("ExecStart=/opt/forgescan/bin/forgescan-robot --station /srv/cell-1\n"));
+  EXPECT_THAT(robot, HasSubstr("Type=notify\n"));
+  EXPECT_THAT(robot, HasSubstr("WatchdogSec=5\n"));
+  EXPECT_THAT(robot, HasSubstr("AF_CAN"));
+  EXPECT_THAT(robot, HasSubstr("forgescan-cell-1-camera_left.service"));
+  EXPECT_THAT(robot, HasSubstr("ReadWritePaths=/srv/cell-1/log /srv/cell-1/results\n"));
+  const std::string camera = texts.at("forgescan-cell-1-camera_left.service");
+  EXPECT_THAT(camera, HasSubstr("forgescan-camera left --station"));
+  EXPECT_THAT(camera, Not(HasSubstr("AF_CAN")));
+  EXPECT_THAT(camera, Not(HasSubstr("-robot.service"))) << "started before the robot, stopped after it";
+  EXPECT_THAT(texts.at("forgescan-cell-1-route.service"), HasSubstr("route replace 239.255.76.67/32 dev lo"));
+  EXPECT_THAT(texts.at("forgescan-cell-1.target"), HasSubstr("forgescan-cell-1-report.service"));
+}
+
+TEST(StationUnits, AStationWithCanOverUdpNeedsNoCanSocketsButARouteMore) {
+  const auto texts = TextsOf("udp:239.74.163.2:43113");
+  EXPECT_THAT(texts.at("forgescan-cell-1-robot.service"), Not(HasSubstr("AF_CAN")));
+  EXPECT_THAT(texts.at("forgescan-cell-1-route.service"), HasSubstr("239.74.163.2/32"));
+}
+
+TEST(StationUnits, RefusesNamesThatWouldMeanSomethingElse) {
+  Station station;
+  station.name = "cell";
+  station.results = "/srv/results";
+  const UnitOptions good{"/srv/cell", "/opt/bin", "forgescan", ""};
+  EXPECT_TRUE(MakeUnits(station, {}, good).ok());
+  for (const char* folder : {"/srv/my cell", "/srv/50%", "/srv/a\nb", "", "/srv/$HOME"}) {
+    UnitOptions wrong = good;
+    wrong.folder = folder;
+    EXPECT_FALSE(MakeUnits(station, {}, wrong).ok()) << folder;
+  }
+  for (const char* name : {"../cell", "a cell", "a/b"}) {
+    station.name = name;
+    EXPECT_FALSE(MakeUnits(station, {}, good).ok()) << name;
+  }
+}
+
+// Whole files, as the command writes them, past systemd-analyze verify.
+class Verified : public ::testing::TestWithParam<const char*> {};
+
+TEST_P(Verified, HasNothingSystemdWouldWarnOf) {
+  if (std::system("command -v systemd-analyze >/dev/null 2>&1") != 0) {
+    GTEST_SKIP() << "systemd-analyze is not installed (package systemd)";
+  }
+  const fs::path base = fs::path(::testing::TempDir()) / ("forgescan_units_" + std::to_string(getpid()));
+  fs::create_directories(base / "cell/log");
+  fs::create_directories(base / "cell/results");
+  std::ofstream(base / "cell/station.toml")
+      << "[station]\nname = \"cell\"\nbus = \"udpm://239.255.76.67:7667?ttl=0\"\ncan = \"" << GetParam()
+      << "\"\ncalibration = \"c\"\npattern = \"p\"\nviews = \"v\"\nmodel = \"m\"\nfeatures = \"f\"\n"
+         "results = \"results\"\n";
+  const auto call = [](const std::string& command, std::string& text) {
+    FILE* pipe = popen((command + " 2>&1").c_str(), "r");
+    std::array<char, 4096> buffer{};
+    while (std::fgets(buffer.data(), buffer.size(), pipe) != nullptr) {
+      text += buffer.data();
+    }
+    return WEXITSTATUS(pclose(pipe));
+  };
+  std::string written, verified;
+  ASSERT_EQ(call(std::string(FORGESCAN_BIN_DIR) + "/forgescan station units " + (base / "cell").string() +
+                     " --out " + (base / "units").string(),
+                 written),
+            0)
+      << written;
+  EXPECT_EQ(call("systemd-analyze verify --man=no " + (base / "units").string() + "/*", verified), 0)
+      << verified;
+  EXPECT_EQ(verified, "");
+  fs::remove_all(base);
+}
+
+INSTANTIATE_TEST_SUITE_P(CanBuses, Verified, ::testing::Values("socketcan:can0", "udp:239.74.163.2:43113"),
+                         [](const auto& param) {
+                           return std::string(param.param).starts_with("udp") ? "Udp" : "SocketCan";
+                         });
+
+}  // namespace
+}  // namespace forgescan

@@ -1,0 +1,125 @@
+#include "tools/forgescan/replay/replay_run.h"
+
+#include <map>
+#include <memory>
+
+#include "services/common/bus/channel_list.h"
+#include "services/common/bus/channels.h"
+#include "services/common/bus/stream_header.h"
+#include "tools/forgescan/replay/message_text.h"
+#include "tools/forgescan/replay/replay_network.h"
+
+namespace forgescan {
+namespace {
+
+class Run {
+ public:
+  Run(const RecordedSession& session, const ReplayOptions& options, ReplayOutcome& outcome)
+      : session_(session), options_(options), outcome_(outcome) {}
+
+  Status Start(const Station& station) {
+    const std::int64_t start_us = session_.events().front().utime;
+    const auto on_result = [this](const std::string& channel, ByteView message) {
+      options_.on_result(channel, message);
+      Keep(outcome_.comparison.Add(channel, message));
+    };
+    const auto add = [&](std::vector<ReplayableService> services) -> Status {
+      ASSIGN_OR_RETURN(auto network,
+                       ReplayNetwork::Create(station, std::move(services), start_us, on_result));
+      networks_.push_back(std::move(network));
+      return {};
+    };
+    if (options_.chained) {
+      return add(options_.services);
+    }
+    for (const ReplayableService& service : options_.services) {
+      RETURN_IF_ERROR(add({service}));
+    }
+    return {};
+  }
+
+  Status Feed(const RecordedEvent& event) {
+    const std::string& channel = session_.ChannelOf(event);
+    std::vector<ReplayNetwork*> receivers;
+    for (const auto& network : networks_) {
+      if (network->Needs(channel) || channel == kServiceState.name) {
+        receivers.push_back(network.get());
+      }
+    }
+    if (receivers.empty()) {
+      return {};
+    }
+    ASSIGN_OR_RETURN(Bytes message, session_.Read(event));
+    std::int64_t lost_before = 0;
+    if (!IsStateChannel(channel)) {
+      const Result<StreamHeader> header = CheckStreamHeader(message);
+      if (!header.ok()) {  // the services would not take it either
+        outcome_.changed_inputs.push_back(
+            fmt::format("{}: {} is not as it was sent: {}", session_.Where(event),
+                        MessageTitle(session_.types(), channel, message), header.error().message));
+        return {};
+      }
+      lost_before = LostBefore(channel, *header);
+    }
+    for (ReplayNetwork* network : receivers) {
+      RETURN_IF_ERROR(network->Feed(event.utime, channel, message, lost_before));
+    }
+    return std::exchange(problem_, Status());
+  }
+
+  Status Finish() {
+    for (const auto& network : networks_) {
+      network->Finish();
+    }
+    outcome_.comparison.Finish();
+    return problem_;
+  }
+
+ private:
+  void Keep(const Status& status) {
+    if (problem_.ok()) {
+      problem_ = status;
+    }
+  }
+
+  std::int64_t LostBefore(const std::string& channel, const StreamHeader& header) {
+    const auto before = last_.find(channel);
+    const std::int64_t lost =
+        before == last_.end() ? 0 : session_.LostBetween(channel, before->second, header);
+    last_[channel] = header;
+    return lost;
+  }
+
+  const RecordedSession& session_;
+  const ReplayOptions& options_;
+  ReplayOutcome& outcome_;
+  std::vector<std::unique_ptr<ReplayNetwork>> networks_;
+  std::map<std::string, StreamHeader> last_;  // fed, by channel
+  Status problem_;                            // the first of the comparison
+};
+
+}  // namespace
+
+Result<ReplayOutcome> Replay(const RecordedSession& session, const Station& station,
+                             const ReplayOptions& options) {
+  std::vector<std::string> channels;
+  for (const ReplayableService& service : options.services) {
+    channels.insert(channels.end(), service.results.begin(), service.results.end());
+  }
+  ASSIGN_OR_RETURN(ResultComparison comparison, ResultComparison::Create(session, channels));
+  ReplayOutcome outcome{std::move(comparison), {}};
+  if (session.events().empty()) {
+    return Fail(ErrorCode::kInvalidArgument, "the recording holds no message to replay");
+  }
+  Run run(session, options, outcome);
+  RETURN_IF_ERROR(run.Start(station));
+  std::size_t done = 0;
+  for (const RecordedEvent& event : session.events()) {
+    RETURN_IF_ERROR(run.Feed(event));
+    options.on_progress(static_cast<double>(++done) / static_cast<double>(session.events().size()));
+  }
+  RETURN_IF_ERROR(run.Finish());
+  return outcome;
+}
+
+}  // namespace forgescan

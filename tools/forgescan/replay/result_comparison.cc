@@ -1,0 +1,83 @@
+#include "tools/forgescan/replay/result_comparison.h"
+
+#include <algorithm>
+
+#include "services/common/bus/stream_header.h"
+
+namespace forgescan {
+
+Result<ResultComparison> ResultComparison::Create(const RecordedSession& session,
+                                                  const std::vector<std::string>& channels) {
+  ResultComparison comparison(session);
+  for (const std::string& channel : channels) {
+    comparison.channels_[channel] = {};
+  }
+  for (const RecordedEvent& event : session.events()) {
+    const std::string& channel = session.ChannelOf(event);
+    if (!comparison.channels_.contains(channel)) {
+      continue;
+    }
+    ASSIGN_OR_RETURN(const Bytes start, session.ReadStart(event, kStreamHeaderBytes));
+    const auto utime = StreamUtime(start);
+    if (!utime.ok()) {
+      return Fail(ErrorCode::kFormat, "{}: {}", session.Where(event), utime.error().message);
+    }
+    comparison.recorded_[{channel, *utime}].push_back(event);
+  }
+  return comparison;
+}
+
+Status ResultComparison::Add(const std::string& channel, ByteView replayed) {
+  const auto utime = StreamUtime(replayed);
+  if (!utime.ok()) {
+    return utime.error();
+  }
+  const Moment moment{channel, *utime};
+  const std::size_t index = replayed_[moment]++;
+  const auto recorded = recorded_.find(moment);
+  if (recorded == recorded_.end() || index >= recorded->second.size()) {
+    ++channels_[channel].extra;
+    return {};
+  }
+  return Compare(recorded->second[index], channel, replayed);
+}
+
+Status ResultComparison::Compare(const RecordedEvent& event, const std::string& channel, ByteView replayed) {
+  ASSIGN_OR_RETURN(Bytes recorded, session_->Read(event));
+  const Result<StreamHeader> header = CheckStreamHeader(recorded);
+  if (!header.ok()) {
+    return Fail(ErrorCode::kFormat, "{}: {}", session_->Where(event), header.error().message);
+  }
+  Bytes numbered(replayed.begin(), replayed.end());
+  RETURN_IF_ERROR(StampStreamHeader(numbered, *header));
+  if (numbered == recorded) {
+    ++channels_[channel].equal;
+    return {};
+  }
+  ++channels_[channel].differing;
+  if (!first_difference_.has_value()) {
+    first_difference_ = {channel, session_->Where(event), std::move(recorded), std::move(numbered)};
+  }
+  return {};
+}
+
+void ResultComparison::Finish() {
+  for (const auto& [moment, events] : recorded_) {
+    const auto came = replayed_.find(moment);
+    const std::size_t count = came == replayed_.end() ? 0 : std::min(came->second, events.size());
+    channels_[moment.first].missing += static_cast<std::int64_t>(events.size() - count);
+  }
+}
+
+bool ResultComparison::Same() const {
+  std::int64_t equal = 0;
+  for (const auto& [channel, counts] : channels_) {
+    if (!counts.Same()) {
+      return false;
+    }
+    equal += counts.equal;
+  }
+  return equal > 0;
+}
+
+}  // namespace forgescan

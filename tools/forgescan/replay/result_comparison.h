@@ -1,0 +1,63 @@
+// Holds what services send in a replay against what was recorded, byte for byte. Only the stream's numbering
+// is taken over from the record: session and sequence say how long the sender had been running, and a part's
+// recording does not begin with the first message. The checksum over all bytes is computed anew with them, so
+// the comparison is of whole messages.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "tools/forgescan/replay/recorded_session.h"
+
+namespace forgescan {
+
+struct ChannelComparison {
+  std::int64_t equal = 0;
+  std::int64_t differing = 0;
+  std::int64_t missing = 0;  // recorded, but not sent in the replay
+  std::int64_t extra = 0;    // sent in the replay, but not recorded
+
+  bool Same() const { return differing == 0 && missing == 0 && extra == 0; }
+};
+
+// The first message that is not as recorded.
+struct FirstDifference {
+  std::string channel;
+  std::string where;  // of the recorded message
+  Bytes recorded;
+  Bytes replayed;
+};
+
+class ResultComparison {
+ public:
+  // `session` outlives the comparison. Errors: kIo.
+  static Result<ResultComparison> Create(const RecordedSession& session,
+                                         const std::vector<std::string>& channels);
+
+  // A message sent in the replay. Messages belong together by channel and utime, several with one utime in
+  // their order. Errors: kIo (the record cannot be read), kFormat (the recorded message was changed).
+  Status Add(const std::string& channel, ByteView replayed);
+  // After the last message: what has not come is missing.
+  void Finish();
+
+  const std::map<std::string, ChannelComparison>& channels() const { return channels_; }
+  const std::optional<FirstDifference>& first_difference() const { return first_difference_; }
+  // No difference, and something was compared.
+  bool Same() const;
+
+ private:
+  using Moment = std::pair<std::string, std::int64_t>;  // channel, utime of the message
+  explicit ResultComparison(const RecordedSession& session) : session_(&session) {}
+  Status Compare(const RecordedEvent& event, const std::string& channel, ByteView replayed);
+
+  const RecordedSession* session_;
+  std::map<Moment, std::vector<RecordedEvent>> recorded_;
+  std::map<Moment, std::size_t> replayed_;  // how many have come
+  std::map<std::string, ChannelComparison> channels_;
+  std::optional<FirstDifference> first_difference_;
+};
+
+}  // namespace forgescan

@@ -1,0 +1,78 @@
+#include "tools/forgescan/replay/what_if.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+
+#include "services/common/bus/channels.h"
+#include "services/common/bus/codec.h"
+
+namespace forgescan {
+namespace {
+
+constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+
+void AddRecorded(const fsmsg::verdict_t& verdict, PartChange& change) {
+  change.recorded_verdict = verdict.verdict;
+  change.recorded_reason = verdict.reason;
+  for (const auto& d : verdict.dimensions) {
+    change.dimensions.push_back({d.name, d.lower_mm, d.upper_mm, d.measured_mm, kNone, d.uncertainty_mm,
+                                 kNone, d.verdict, fsmsg::verdict_t::VERDICT_UNKNOWN});
+  }
+}
+
+void AddNow(const fsmsg::verdict_t& verdict, PartChange& change) {
+  change.now_verdict = verdict.verdict;
+  change.now_reason = verdict.reason;
+  for (const auto& d : verdict.dimensions) {
+    auto known = std::find_if(change.dimensions.begin(), change.dimensions.end(),
+                              [&d](const auto& other) { return other.name == d.name; });
+    if (known == change.dimensions.end()) {
+      change.dimensions.push_back({d.name, 0, 0, kNone, kNone, kNone, kNone, 0, 0});
+      known = std::prev(change.dimensions.end());
+    }
+    known->lower_mm = d.lower_mm;
+    known->upper_mm = d.upper_mm;
+    known->now_mm = d.measured_mm;
+    known->now_u_mm = d.uncertainty_mm;
+    known->now_verdict = d.verdict;
+  }
+}
+
+}  // namespace
+
+Result<std::vector<fsmsg::verdict_t>> RecordedVerdicts(const RecordedSession& session) {
+  std::vector<fsmsg::verdict_t> verdicts;
+  for (const RecordedEvent& event : session.events()) {
+    if (session.ChannelOf(event) == kVerdict.name) {
+      ASSIGN_OR_RETURN(const Bytes message, session.Read(event));
+      ASSIGN_OR_RETURN(verdicts.emplace_back(), Decode<fsmsg::verdict_t>(message));
+    }
+  }
+  return verdicts;
+}
+
+std::vector<PartChange> CompareVerdicts(const std::vector<fsmsg::verdict_t>& recorded,
+                                        const std::vector<fsmsg::verdict_t>& now) {
+  std::map<std::pair<std::int64_t, int>, PartChange> parts;  // by utime, number
+  const auto find = [&parts](const fsmsg::verdict_t& verdict) -> PartChange& {
+    PartChange& change = parts[{verdict.utime, verdict.part}];
+    change.part = verdict.part;
+    change.utime = verdict.utime;
+    return change;
+  };
+  for (const auto& verdict : recorded) {
+    AddRecorded(verdict, find(verdict));
+  }
+  for (const auto& verdict : now) {
+    AddNow(verdict, find(verdict));
+  }
+  std::vector<PartChange> changes;
+  for (auto& [key, change] : parts) {
+    changes.push_back(std::move(change));
+  }
+  return changes;
+}
+
+}  // namespace forgescan

@@ -1,0 +1,150 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "services/report/report_style.h"
+#include "services/report/report_text.h"
+#include "tools/forgescan/replay/what_if.h"
+
+namespace forgescan {
+namespace {
+
+constexpr const char* kNames[] = {"none", "OK", "NOT_OK", "NOT_DECIDABLE", "NOT_INSPECTED"};
+constexpr const char* kClasses[] = {"not-inspected", "ok", "not-ok", "not-decidable", "not-inspected"};
+
+std::size_t IndexOf(std::int8_t verdict) {
+  return verdict >= 0 && verdict < 5 ? static_cast<std::size_t>(verdict) : 0;
+}
+const char* NameOf(std::int8_t verdict) { return kNames[IndexOf(verdict)]; }
+
+std::string Chip(std::int8_t verdict) {
+  return fmt::format("<span class=\"chip {}\">{}</span>", kClasses[IndexOf(verdict)], NameOf(verdict));
+}
+
+std::string ChipPair(std::int8_t recorded, std::int8_t now) {
+  return recorded == now ? Chip(now) : Chip(recorded) + " &rarr; " + Chip(now);
+}
+
+std::size_t Flips(const std::vector<PartChange>& parts) {
+  return static_cast<std::size_t>(
+      std::count_if(parts.begin(), parts.end(), [](const auto& part) { return part.Flipped(); }));
+}
+
+// The largest change of each dimension over all parts.
+struct Largest {
+  std::string name;
+  double change_mm = 0.0;
+  int part = 0;
+  int flips = 0;
+};
+
+std::vector<Largest> LargestChanges(const std::vector<PartChange>& parts) {
+  std::vector<Largest> all;
+  for (const PartChange& part : parts) {
+    for (const DimensionChange& d : part.dimensions) {
+      auto found =
+          std::find_if(all.begin(), all.end(), [&d](const auto& other) { return other.name == d.name; });
+      if (found == all.end()) {
+        found = all.insert(all.end(), {d.name, 0.0, part.part, 0});
+      }
+      found->flips += d.Flipped() ? 1 : 0;
+      const double change_mm = d.now_mm - d.recorded_mm;
+      if (std::isfinite(change_mm) && std::abs(change_mm) > std::abs(found->change_mm)) {
+        found->change_mm = change_mm;
+        found->part = part.part;
+      }
+    }
+  }
+  return all;
+}
+
+std::string DimensionRow(const PartChange& part, const DimensionChange& d, bool first) {
+  const std::string number =
+      first ? fmt::format("<td class=\"t strong\" rowspan=\"{}\">{}<br>{}</td>", part.dimensions.size(),
+                          part.part, ChipPair(part.recorded_verdict, part.now_verdict))
+            : std::string();
+  return fmt::format(
+      "<tr>{}<td class=\"t\">{}</td><td>{} &hellip; {}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td>"
+      "<td>{}</td><td class=\"t\">{}</td></tr>\n",
+      number, EscapeHtml(d.name), NumberText(d.lower_mm, 3), NumberText(d.upper_mm, 3),
+      NumberText(d.recorded_mm, 3), NumberText(d.now_mm, 3), SignedText(d.now_mm - d.recorded_mm, 4),
+      NumberText(d.recorded_u_mm, 3), NumberText(d.now_u_mm, 3), ChipPair(d.recorded_verdict, d.now_verdict));
+}
+
+std::string PartRows(const PartChange& part) {
+  std::string rows;
+  for (std::size_t i = 0; i < part.dimensions.size(); ++i) {
+    rows += DimensionRow(part, part.dimensions[i], i == 0);
+  }
+  if (part.Flipped()) {
+    const std::string reason = part.now_reason.empty() ? part.recorded_reason : part.now_reason;
+    rows += fmt::format("<tr class=\"remark\"><td class=\"t\" colspan=\"9\">Part {}: {}</td></tr>\n",
+                        part.part, EscapeHtml(reason));
+  }
+  return rows;
+}
+
+std::string List(const std::vector<std::string>& lines) {
+  std::string items;
+  for (const std::string& line : lines) {
+    items += "<li>" + EscapeHtml(line) + "</li>";
+  }
+  return "<ul>" + items + "</ul>";
+}
+
+std::string Section(const char* title, const std::string& content) {
+  return fmt::format("<section><h2>{}</h2>\n{}</section>\n", title, content);
+}
+
+}  // namespace
+
+std::string WhatIfText(const std::vector<PartChange>& parts) {
+  std::string text;
+  for (const PartChange& part : parts) {
+    if (part.Flipped()) {
+      text += fmt::format("part {}: {} -> {}{}\n", part.part, NameOf(part.recorded_verdict),
+                          NameOf(part.now_verdict),
+                          part.now_reason.empty() ? std::string() : " (" + part.now_reason + ")");
+    }
+    for (const DimensionChange& d : part.dimensions) {
+      if (d.Flipped()) {
+        text += fmt::format("part {}: {}: {} -> {}, {:.4f} -> {:.4f} mm\n", part.part, d.name,
+                            NameOf(d.recorded_verdict), NameOf(d.now_verdict), d.recorded_mm, d.now_mm);
+      }
+    }
+  }
+  text += fmt::format("{} of {} verdicts change\n", Flips(parts), parts.size());
+  for (const Largest& largest : LargestChanges(parts)) {
+    text += largest.change_mm == 0.0
+                ? fmt::format("  {}: every size as recorded\n", largest.name)
+                : fmt::format("  {}: largest change {:+.4f} mm (part {}), {} verdicts change\n", largest.name,
+                              largest.change_mm, largest.part, largest.flips);
+  }
+  return text;
+}
+
+std::string WhatIfHtml(const WhatIfPage& page, const std::vector<PartChange>& parts) {
+  std::string rows =
+      "<tr><th class=\"t\">Part</th><th class=\"t\">Dimension</th><th>Limits (mm)</th><th>Recorded (mm)</th>"
+      "<th>Now (mm)</th><th>Change (mm)</th><th>U recorded</th><th>U now</th><th "
+      "class=\"t\">Verdict</th></tr>\n";
+  for (const PartChange& part : parts) {
+    rows += PartRows(part);
+  }
+  const std::string flips = fmt::format("{} of {}", Flips(parts), parts.size());
+  const std::string body =
+      fmt::format(
+          "<header><div><div class=\"over\">What if</div><h1>{} verdicts change</h1>"
+          "<div class=\"sub\">Station {}</div></div></header>\n",
+          flips, EscapeHtml(page.station)) +
+      Section("Changed settings", page.changes.empty() ? "<p class=\"none\">None.</p>" : List(page.changes)) +
+      Section("Parts", "<table>" + rows + "</table>") + Section("Recordings", List(page.recordings));
+  return fmt::format(
+      "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" "
+      "content=\"width=device-width,initial-scale=1\"><title>What if: {} verdicts "
+      "change</title><style>{}</style></head>\n<body><main>\n{}</main></body></html>\n",
+      flips, kReportStyle, body);
+}
+
+}  // namespace forgescan

@@ -1,0 +1,24 @@
+#include "tools/forgescan/station/supervision_policy.h"
+
+namespace forgescan {
+
+Result<SupervisionPolicy> SupervisionPolicy::Load(ConfigTable table) {
+  SupervisionPolicy policy;
+  table.Optional("silence_s", policy.silence_s, 1.5, 3600.0);  // services speak once a second
+  table.Optional("start_patience_s", policy.start_patience_s, 1.0, 3600.0);
+  table.Optional("stage_patience_s", policy.stage_patience_s, 0.0, 600.0);
+  table.Optional("restarts_max", policy.restarts_max, 0, 1000);
+  table.Optional("restart_window_s", policy.restart_window_s, 1.0, 86'400.0);
+  table.Optional("backoff_s", policy.backoff_s, 0.0, 600.0);
+  table.Optional("backoff_max_s", policy.backoff_max_s, 0.0, 3600.0);
+  table.Optional("keep_running", policy.keep_running);
+  table.Optional("drain_s", policy.drain_s, 0.0, 600.0);
+  table.Optional("stop_patience_s", policy.stop_patience_s, 0.1, 600.0);
+  if (policy.backoff_max_s < policy.backoff_s) {
+    table.Reject("backoff_max_s", "is less than backoff_s");
+  }
+  RETURN_IF_ERROR(table.Finish());
+  return policy;
+}
+
+}  // namespace forgescan
