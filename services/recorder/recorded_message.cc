@@ -3,6 +3,7 @@
 #include <cstring>
 #include <string_view>
 
+#include "services/common/bus/big_endian.h"
 #include "services/common/bus/channels.h"
 #include "services/common/bus/codec.h"
 #include "services/recorder/gaps.h"
@@ -11,16 +12,7 @@ namespace forgescan {
 namespace {
 
 // Every type of a stream begins with utime, session, sequence, crc32 and then its part, but for one.
-constexpr std::size_t kUtimeAt = 8, kSessionAt = 16, kSequenceAt = 24, kPartAt = kStreamHeaderBytes;
-
-template <typename Integer>
-Integer BigEndian(ByteView bytes, std::size_t at) {
-  std::uint64_t value = 0;
-  for (std::size_t i = 0; i < sizeof(Integer); ++i) {
-    value = value << 8 | bytes[at + i];
-  }
-  return static_cast<Integer>(value);
-}
+constexpr std::size_t kPartAt = kStreamHeaderBytes;
 
 std::optional<std::int32_t> PartIn(const ChannelInfo& channel, ByteView bytes) {
   if (std::string_view(channel.type) == fsmsg::processing_time_t::getTypeName()) {
@@ -28,8 +20,8 @@ std::optional<std::int32_t> PartIn(const ChannelInfo& channel, ByteView bytes) {
     return time.ok() ? std::optional(time->part) : std::nullopt;
   }
   const bool ours = bytes.size() >= kPartAt + sizeof(std::int32_t) &&
-                    BigEndian<std::int64_t>(bytes, 0) == channel.fingerprint;
-  return ours ? std::optional(BigEndian<std::int32_t>(bytes, kPartAt)) : std::nullopt;
+                    BigEndianAt<std::int64_t>(bytes, 0) == channel.fingerprint;
+  return ours ? std::optional(BigEndianAt<std::int32_t>(bytes, kPartAt)) : std::nullopt;
 }
 
 }  // namespace
@@ -38,11 +30,13 @@ StreamMessage ReadStreamMessage(const ChannelInfo& channel, ByteView bytes, std:
   StreamMessage read;
   read.message.now_us = now_us;
   read.message.bytes = static_cast<std::int64_t>(bytes.size());
-  if (bytes.size() < kStreamHeaderBytes) {
+  const auto header = ReadStreamHeader(bytes);
+  const auto utime = StreamUtime(bytes);
+  if (!header.ok() || !utime.ok()) {
     return read;
   }
-  read.message.utime = BigEndian<std::int64_t>(bytes, kUtimeAt);
-  read.header = {BigEndian<std::int64_t>(bytes, kSessionAt), BigEndian<std::int64_t>(bytes, kSequenceAt)};
+  read.message.utime = *utime;
+  read.header = *header;
   read.message.part = PartIn(channel, bytes);
   const std::string_view name = channel.name;
   if (name == kPartArrived.name) {
@@ -59,9 +53,9 @@ StreamMessage ReadStreamMessage(const ChannelInfo& channel, ByteView bytes, std:
 
 fsmsg::recording_gap_t DroppedGap(const ChannelInfo& channel, ByteView bytes) {
   fsmsg::recording_gap_t gap = GapOf(channel.name, "left out: the disk was too slow");
-  if (channel.kind == ChannelKind::kStream && bytes.size() >= kStreamHeaderBytes) {
-    gap.session = BigEndian<std::int64_t>(bytes, kSessionAt);
-    gap.first_sequence = gap.last_sequence = BigEndian<std::int64_t>(bytes, kSequenceAt);
+  if (const auto header = ReadStreamHeader(bytes); channel.kind == ChannelKind::kStream && header.ok()) {
+    gap.session = header->session;
+    gap.first_sequence = gap.last_sequence = header->sequence;
   }
   return gap;
 }

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <array>
 
+#include "services/common/bus/big_endian.h"
+
 namespace forgescan {
 namespace {
 
@@ -17,21 +19,19 @@ void Put(Bytes& message, std::size_t at, Integer value) {
   }
 }
 
-template <typename Integer>
-Integer Get(ByteView message, std::size_t at) {
-  std::uint64_t value = 0;
-  for (std::size_t i = 0; i < sizeof(Integer); ++i) {
-    value = value << 8 | message[at + i];
-  }
-  return static_cast<Integer>(value);
-}
-
 std::uint32_t CrcWithoutItself(ByteView message) {
   constexpr std::array<std::uint8_t, 4> kZero{};
   std::uint32_t crc = libdeflate_crc32(0, message.data(), kCrcAt);
   crc = libdeflate_crc32(crc, kZero.data(), kZero.size());
   const ByteView rest = message.subspan(kStreamHeaderBytes);
   return rest.empty() ? crc : libdeflate_crc32(crc, rest.data(), rest.size());
+}
+
+Status CheckLength(ByteView message) {
+  if (message.size() < kStreamHeaderBytes) {
+    return Fail(ErrorCode::kFormat, "{} bytes are too short for a stream message", message.size());
+  }
+  return {};
 }
 
 }  // namespace
@@ -48,20 +48,22 @@ Status StampStreamHeader(Bytes& message, const StreamHeader& header) {
 }
 
 Result<std::int64_t> StreamUtime(ByteView message) {
-  if (message.size() < kStreamHeaderBytes) {
-    return Fail(ErrorCode::kFormat, "{} bytes are too short for a stream message", message.size());
-  }
-  return Get<std::int64_t>(message, kUtimeAt);
+  RETURN_IF_ERROR(CheckLength(message));
+  return BigEndianAt<std::int64_t>(message, kUtimeAt);
+}
+
+Result<StreamHeader> ReadStreamHeader(ByteView message) {
+  RETURN_IF_ERROR(CheckLength(message));
+  return StreamHeader{BigEndianAt<std::int64_t>(message, kSessionAt),
+                      BigEndianAt<std::int64_t>(message, kSequenceAt)};
 }
 
 Result<StreamHeader> CheckStreamHeader(ByteView message) {
-  if (message.size() < kStreamHeaderBytes) {
-    return Fail(ErrorCode::kFormat, "{} bytes are too short for a stream message", message.size());
-  }
-  if (Get<std::uint32_t>(message, kCrcAt) != CrcWithoutItself(message)) {
+  RETURN_IF_ERROR(CheckLength(message));
+  if (BigEndianAt<std::uint32_t>(message, kCrcAt) != CrcWithoutItself(message)) {
     return Fail(ErrorCode::kFormat, "a message of {} bytes has a wrong CRC-32", message.size());
   }
-  return StreamHeader{Get<std::int64_t>(message, kSessionAt), Get<std::int64_t>(message, kSequenceAt)};
+  return ReadStreamHeader(message);
 }
 
 }  // namespace forgescan

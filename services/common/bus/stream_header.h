@@ -21,6 +21,9 @@ inline constexpr std::size_t kStreamHeaderBytes = 36;
 Status StampStreamHeader(Bytes& message, const StreamHeader& header);
 // When the message's event was, us since 1970 UTC. Errors: kFormat (shorter than a header).
 Result<std::int64_t> StreamUtime(ByteView message);
+// The header as it stands there; for a message whose CRC was checked before. Errors: kFormat (shorter than a
+// header).
+Result<StreamHeader> ReadStreamHeader(ByteView message);
 // Errors: kFormat (too short, or the CRC does not match its bytes).
 Result<StreamHeader> CheckStreamHeader(ByteView message);
 

@@ -3,7 +3,7 @@
 #include <bit>
 #include <cmath>
 
-#include "services/common/log/big_endian.h"
+#include "services/common/bus/big_endian.h"
 
 namespace forgescan {
 namespace {

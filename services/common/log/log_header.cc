@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "services/common/log/big_endian.h"
+#include "services/common/bus/big_endian.h"
 
 namespace forgescan {
 namespace {

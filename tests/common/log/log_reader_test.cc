@@ -8,7 +8,7 @@
 #include <fstream>
 #include <map>
 
-#include "services/common/log/big_endian.h"
+#include "services/common/bus/big_endian.h"
 #include "tests/common/log/synthetic_log.h"
 #include "tests/common/real_data.h"
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <map>
 
-#include "services/common/log/big_endian.h"
+#include "services/common/bus/big_endian.h"
 
 namespace forgescan {
 namespace {

@@ -5,10 +5,10 @@
 #include <tuple>
 
 #include "services/common/base64.h"
+#include "services/common/bus/big_endian.h"
 #include "services/common/bus/cloud_stream.h"
 #include "services/common/bus/codec.h"
 #include "services/common/bus/stream_header.h"
-#include "services/common/log/big_endian.h"
 #include "services/common/log/lcm_decode.h"
 #include "tools/forgescan/log/progress.h"
 

@@ -1,6 +1,6 @@
 #include "tools/forgescan/log/message_check.h"
 
-#include "services/common/log/big_endian.h"
+#include "services/common/bus/big_endian.h"
 #include "services/common/log/lcm_decode.h"
 
 namespace forgescan {

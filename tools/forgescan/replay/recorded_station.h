@@ -27,7 +27,7 @@ Result<Station> UnpackStation(const RecordedSession& session, const StationChang
                               const std::filesystem::path& folder);
 
 // How the station's files differ from the recorded ones, one line each: "registration.start_rotation_rad =
-// 0.06 was 0.03", "calibration is another file". Errors: kFormat, kIo.
+// 0.06, recorded as 0.03", "calibration is another file: PATH". Errors: kFormat, kIo.
 Result<std::vector<std::string>> DescribeChanges(const RecordedSession& session, const Station& station);
 
 }  // namespace forgescan
