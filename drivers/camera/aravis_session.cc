@@ -12,6 +12,7 @@ namespace {
 constexpr std::uint64_t kPopTimeout_us = 50'000;  // how soon a receiving thread notices that it shall end
 constexpr int kRealtimePriority = 10;
 constexpr int kNiceLevel = -10;
+constexpr std::uint64_t kHeartbeatTimeoutRegister = 0x0938;  // GigE Vision bootstrap register, ms
 constexpr char kChunks[] = "FrameID,Timestamp,ExposureTime";
 
 void OnStreamEvent(void* self, ArvStreamCallbackType type, ArvBuffer* /*buffer*/) {
@@ -61,10 +62,18 @@ Status AravisSession::Open() {
     return Fail(ErrorCode::kUnavailable, "camera {}: another host controls it", options_.address);
   }
   g_signal_connect(arv_camera_get_device(camera_.get()), "control-lost", G_CALLBACK(OnControlLost), this);
+  RETURN_IF_ERROR(ConfigureControl());
   RETURN_IF_ERROR(ConfigureImage());
   RETURN_IF_ERROR(ConfigureTransport());
   RETURN_IF_ERROR(CreateStream());
   return Run();
+}
+
+Status AravisSession::ConfigureControl() {
+  return Attempt(options_.address, "set the heartbeat timeout", [this](GError** error) {
+    arv_device_write_register(arv_camera_get_device(camera_.get()), kHeartbeatTimeoutRegister,
+                              static_cast<guint32>(options_.heartbeat_timeout_ms), error);
+  });
 }
 
 Status AravisSession::ConfigureImage() {

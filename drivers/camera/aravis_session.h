@@ -44,6 +44,7 @@ class AravisSession {
   void ReportLoss();
 
  private:
+  Status ConfigureControl();
   Status ConfigureImage();
   Status ConfigureTransport();
   Status CreateStream();

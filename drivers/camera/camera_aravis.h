@@ -33,7 +33,10 @@ struct CameraAravisOptions {
   int socket_buffer_bytes = 32 * 1024 * 1024;
   int buffers = 24;                        // receive buffers: at least one whole sequence of patterns
   std::size_t queue_capacity_frames = 64;  // waiting for Dispatch()
-  int teardown_wait_ms = 1000;             // how long Start() waits for an earlier session to be gone
+  // How long the camera stays with a host it no longer hears, and refuses another one. Aravis is heard once a
+  // second and repeats a lost question after 0.5 s, so less than 1500 would give up a camera for one packet.
+  int heartbeat_timeout_ms = 1600;
+  int teardown_wait_ms = 1000;  // how long Start() waits for an earlier session to be gone
   bool realtime_thread = true;  // ask for real-time priority on the receive thread; a refusal is counted
 
   // Errors: kInvalidArgument with the member, its value and its range.

@@ -15,9 +15,10 @@ struct CameraConfig {
   int exposure_us = 12'000;      // as the trigger service orders it; every frame is checked against it
   int packet_size_bytes = 9000;  // IP packet
   int packet_delay_ns = 0;
-  double frame_deadline_s = 1.0;  // from an exposure record to its frame: exposure, wire time and resends
-  double view_timeout_s = 15.0;   // from the end of a view to its last exposure record
-  double reconnect_s = 1.0;       // between two attempts to reach the camera
+  double frame_deadline_s = 1.0;    // from an exposure record to its frame: exposure, wire time and resends
+  double view_timeout_s = 15.0;     // from the end of a view to its last exposure record
+  double reconnect_s = 0.2;         // between two attempts to reach the camera
+  int heartbeat_timeout_ms = 1600;  // the camera obeys another host once this one is silent for so long
   FramePairingOptions pairing;
 
   // side: "left" or "right".

@@ -26,6 +26,7 @@ Result<std::shared_ptr<void>> Make(const ServiceContext& context, const std::str
   options.height_px = config.height_px;
   options.exposure_us = config.exposure_us;
   options.packet_size_bytes = config.packet_size_bytes;
+  options.heartbeat_timeout_ms = config.heartbeat_timeout_ms;
   options.packet_delay_ns = config.packet_delay_ns;
   RETURN_IF_ERROR(options.Check());
   const auto camera = side == "left" ? fsmsg::exposure_t::CAMERA_LEFT : fsmsg::exposure_t::CAMERA_RIGHT;
