@@ -69,11 +69,12 @@ function(forgescan_program name)
   add_dependencies(programs ${name})
 endfunction()
 
-# forgescan_test(NAME SOURCES... DEPS targets... [NETWORK]): one GoogleTest program = one ctest entry. Paths reach the test
+# forgescan_test(NAME SOURCES... DEPS targets... [NETWORK] [CASES...]): one GoogleTest program = one ctest entry; with CASES one
+# entry NAME.CASE for each, which runs the tests of that name and fails if there are none. Paths reach the test
 # as FORGESCAN_SOURCE_DIR (the repository) and FORGESCAN_BIN_DIR (programs). NETWORK gives it a network namespace of its own
 # with loopback and LCM's multicast route, so that such tests run in parallel and need no host settings.
 function(forgescan_test name)
-  cmake_parse_arguments(ARG "NETWORK" "TIMEOUT" "SOURCES;DEPS" ${ARGN})
+  cmake_parse_arguments(ARG "NETWORK" "TIMEOUT" "SOURCES;DEPS;CASES" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE forgescan_options ${ARG_DEPS} GTest::gtest GTest::gmock GTest::gtest_main)
   target_compile_definitions(${name} PRIVATE FORGESCAN_SOURCE_DIR="${CMAKE_SOURCE_DIR}"
@@ -81,10 +82,19 @@ function(forgescan_test name)
   target_compile_options(${name} PRIVATE ${FORGESCAN_QUICK_TO_BUILD})
   target_precompile_headers(${name} REUSE_FROM forgescan_test_headers)
   set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/tests)
+  set(command $<TARGET_FILE:${name}>)
   if(ARG_NETWORK)
-    add_test(NAME ${name} COMMAND ${CMAKE_SOURCE_DIR}/tools/with-network $<TARGET_FILE:${name}>)
+    set(command ${CMAKE_SOURCE_DIR}/tools/with-network ${command})
+  endif()
+  set(entries ${name})
+  if(ARG_CASES)
+    list(TRANSFORM ARG_CASES PREPEND ${name}. OUTPUT_VARIABLE entries)
+    foreach(case ${ARG_CASES})
+      add_test(NAME ${name}.${case} COMMAND ${command} --gtest_filter=*.${case})
+    endforeach()
+    set_tests_properties(${entries} PROPERTIES FAIL_REGULAR_EXPRESSION "Running 0 tests")
   else()
-    add_test(NAME ${name} COMMAND ${name})
+    add_test(NAME ${name} COMMAND ${command})
   endif()
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 120)
@@ -92,8 +102,8 @@ function(forgescan_test name)
   if(FORGESCAN_SANITIZE)
     math(EXPR ARG_TIMEOUT "${ARG_TIMEOUT} * 5")
   endif()
-  set_tests_properties(${name} PROPERTIES TIMEOUT ${ARG_TIMEOUT})
-  set_tests_properties(${name} PROPERTIES ENVIRONMENT "${FORGESCAN_TEST_ENVIRONMENT}")
+  set_tests_properties(${entries} PROPERTIES TIMEOUT ${ARG_TIMEOUT})
+  set_tests_properties(${entries} PROPERTIES ENVIRONMENT "${FORGESCAN_TEST_ENVIRONMENT}")
 endfunction()
 
 # uses_regex(TARGET): GCC 12 warns of std::regex's own members when sanitizers are on (a false alarm); only there, and only

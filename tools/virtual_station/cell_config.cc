@@ -11,6 +11,7 @@ namespace {
 
 constexpr int kCameraWidthPx = 2448;
 constexpr int kCameraHeightPx = 2048;
+constexpr int kSideStepPx = 4;  // of a virtual camera's sensor
 
 Result<Lens> ReadLens(const CellFile& file, const std::string& section_name, double scale) {
   TomlSection s = file.Section(section_name);
@@ -58,8 +59,8 @@ Status ReadRig(const CellFile& file, int scale_divisor, CellConfig& config) {
   ASSIGN_OR_RETURN(config.rig.right.lens, ReadLens(file, "camera_right", 1.0 / divisor));
   ASSIGN_OR_RETURN(config.rig.projector.lens, ReadLens(file, "projector", 1.0));
   for (PinholeCamera* camera : {&config.rig.left, &config.rig.right}) {
-    camera->width_px = kCameraWidthPx / divisor;
-    camera->height_px = kCameraHeightPx / divisor;
+    camera->width_px = kCameraWidthPx / divisor / kSideStepPx * kSideStepPx;
+    camera->height_px = kCameraHeightPx / divisor / kSideStepPx * kSideStepPx;
   }
   const double distance = config.working_distance_mm;
   config.rig.left.camera_from_rig = LookingAt({-0.5 * baseline, 0.0, 0.0}, distance);

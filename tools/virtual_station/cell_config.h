@@ -117,7 +117,8 @@ struct CellConfig {
 };
 
 // `scale_divisor` overrides image.scale_divisor of the file when it is not 0: tests render 1/4-size images of
-// the same cell. Errors: kNotFound, kFormat naming file, section, key and limits.
+// the same cell. A side becomes a multiple of 4 px, as virtual cameras have it. Errors: kNotFound, kFormat
+// naming file, section, key and limits.
 Result<CellConfig> LoadCellConfig(const std::string& path, int scale_divisor = 0);
 
 }  // namespace forgescan

@@ -9,7 +9,7 @@ namespace forgescan {
 namespace {
 
 const std::string kCell = std::string(FORGESCAN_SOURCE_DIR) + "/stations/virtual/cell.toml";
-constexpr int kDivisor = 8;  // 306 x 256 px: enough to test what does not depend on size
+constexpr int kDivisor = 8;  // 304 x 256 px: enough to test what does not depend on size
 
 CellConfig Config() {
   auto config = LoadCellConfig(kCell, kDivisor);

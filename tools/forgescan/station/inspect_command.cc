@@ -34,6 +34,7 @@ struct InspectOptions {
   std::string cell = "cell.toml";
   double takt_s = 45.0;
   int scale_divisor = 0;  // 0: as the cell file says
+  ModelImportOptions model;
   double part_patience_s = 300.0;
 };
 
@@ -172,7 +173,8 @@ Status Prepare(const InspectOptions& options, const fs::path& run) {
   RETURN_IF_ERROR(prepare.Start("virtual_station_prepare", command));
   RETURN_IF_ERROR(prepare.WaitForSuccess());
   ASSIGN_OR_RETURN(const Station station, Station::Load((run / "station").string()));
-  ASSIGN_OR_RETURN(const ModelBundle model, LoadModel(run / "station" / "model" / "axle.step", {}));
+  ASSIGN_OR_RETURN(const ModelBundle model,
+                   LoadModel(run / "station" / "model" / "axle.step", options.model));
   return WriteBundle(model, station.model);
 }
 
@@ -207,6 +209,14 @@ void AddInspectCommand(CLI::App& app, Status& outcome) {
       ->capture_default_str();
   command->add_option("--scale-divisor", options.scale_divisor, "smaller images; the station must say so too")
       ->check(CLI::IsMember({1, 2, 4, 8}));
+  command->add_option("--model-spacing-mm", options.model.spacing_mm, "of the model's surface samples")
+      ->check(FiniteRange(0.1, 100))
+      ->capture_default_str();
+  command
+      ->add_option("--model-chord-error-mm", options.model.tessellation.chord_error_mm,
+                   "of the model's triangles")
+      ->check(FiniteRange(1e-4, 10))
+      ->capture_default_str();
   command->add_option("--patience", options.part_patience_s, "seconds a part may take")
       ->check(FiniteRange(1, 1e5));
   command->callback([&outcome] { outcome = Inspect(options); });
