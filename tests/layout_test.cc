@@ -183,6 +183,16 @@ TEST(Layout, EveryServiceHasItsPageAndItsMain) {
   EXPECT_GE(services, 9);
 }
 
+TEST(Layout, AddingAServiceTakesLessThanAHundredLines) {
+  std::ifstream page(kSource / "docs/write-a-service.md");
+  int lines = 0;
+  for (std::string line; std::getline(page, line);) {
+    ++lines;
+  }
+  EXPECT_GT(lines, 0);
+  EXPECT_LT(lines, 100);
+}
+
 TEST(Layout, EverySourceIsInTheBuild) {
   for (const File& file : Sources()) {
     if (fs::path(file.path).extension() != ".cc") {
