@@ -6,7 +6,6 @@
 #include <filesystem>
 #include <fstream>
 #include <regex>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -169,14 +168,29 @@ TEST(Layout, FilesAndMainsAreShort) {
 }
 
 TEST(Layout, EveryServiceHasItsPageAndItsMain) {
-  const std::set<std::string> services = {"trigger", "camera",       "robot",  "cooling", "reconstruction",
-                                          "fusion",  "registration", "report", "recorder"};
-  for (const std::string& name : services) {
-    for (const char* file : {"README.md", "main.cc"}) {
-      EXPECT_TRUE(fs::exists(kSource / "services" / name / file)) << name << " has no " << file;
+  int services = 0;
+  for (const auto& entry : fs::directory_iterator(kSource / "services")) {
+    const std::string name = entry.path().filename();
+    if (!entry.is_directory() || name == "common") {
+      continue;
     }
-    EXPECT_TRUE(fs::exists(kSource / "tests/services" / name)) << name << " has no tests";
+    for (const char* file : {"README.md", "main.cc", "CMakeLists.txt"}) {
+      EXPECT_TRUE(fs::exists(entry.path() / file)) << name << " has no " << file;
+    }
+    EXPECT_TRUE(fs::exists(kSource / "tests/services" / name / "CMakeLists.txt")) << name << " has no tests";
+    ++services;
   }
+  EXPECT_GE(services, 9);
+}
+
+TEST(Layout, AddingAServiceTakesLessThanAHundredLines) {
+  std::ifstream page(kSource / "docs/write-a-service.md");
+  int lines = 0;
+  for (std::string line; std::getline(page, line);) {
+    ++lines;
+  }
+  EXPECT_GT(lines, 0);
+  EXPECT_LT(lines, 100);
 }
 
 TEST(Layout, EverySourceIsInTheBuild) {

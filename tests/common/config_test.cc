@@ -40,6 +40,24 @@ TEST(Config, ReadsEveryKind) {
   EXPECT_EQ(unset, 7);
 }
 
+TEST(Config, NamesTheTablesOfATable) {
+  const ConfigFile file = Parse("[own.b]\nx = 1\n[own.a]\n");
+  auto own = file.Table("own");
+  EXPECT_EQ(own.TableNames(), (std::vector<std::string>{"a", "b"}));
+  EXPECT_TRUE(own.Finish().ok()) << "their keys are for their readers";
+  auto none = file.Table("none");
+  EXPECT_TRUE(none.TableNames().empty());
+  auto mixed = Parse("[own]\nc = 1\n").Table("own");
+  static_cast<void>(mixed.TableNames());
+  EXPECT_THAT(mixed.Finish().error().message, HasSubstr("station.toml: own.c must be a table"));
+}
+
+TEST(Config, ATableThatIsAValueIsAnError) {
+  const Status status = Parse("a = 1\n").OnlyTables({"a"});
+  ASSERT_FALSE(status.ok());
+  EXPECT_THAT(status.error().message, HasSubstr("station.toml: line 1: a must be a table"));
+}
+
 TEST(Config, OutOfRangeNamesFileKeyAndLimits) {
   auto file = Parse("[trigger]\nperiod_us = 5\n");
   auto table = file.Table("trigger");

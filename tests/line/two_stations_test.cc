@@ -99,8 +99,8 @@ class TwoStations : public ::testing::Test {
           base_ / (std::string(kName[i]) + ".txt"));
     }
     ASSERT_TRUE(RunUntil([&] {
-      return ears_[0]->sessions.size() == StationServices().size() &&
-             ears_[1]->sessions.size() == StationServices().size();
+      return ears_[0]->sessions.size() == StationServices({}).size() &&
+             ears_[1]->sessions.size() == StationServices({}).size();
     })) << LogOf(0)
         << LogOf(1);
   }

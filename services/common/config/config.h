@@ -51,6 +51,9 @@ class ConfigTable {
   ConfigTable Table(std::string_view key);
   // The tables of [[key]], in file order; none if there is no such key.
   std::vector<ConfigTable> Tables(std::string_view key);
+  // Names of the tables below this one, in alphabetical order; anything but a table in it is an error.
+  // Whoever reads those tables finishes them.
+  std::vector<std::string> TableNames();
   // Takes note of a wrong value that only the caller can judge: "<file>: <key> <what>".
   void Reject(std::string_view key, std::string_view what);
 
@@ -77,7 +80,7 @@ class ConfigFile {
   ConfigTable Root() const;
   // One table of the file; Finish() on it checks that table only.
   ConfigTable Table(std::string_view key) const;
-  // Error if the file has a top-level key that is not in the list.
+  // Error if the file has a top-level key that is not in the list, or is no table.
   [[nodiscard]] Status OnlyTables(const std::vector<std::string>& known) const;
 
  private:

@@ -47,6 +47,10 @@ Status ConfigFile::OnlyTables(const std::vector<std::string>& known) const {
       return Fail(ErrorCode::kInvalidArgument, "{}: line {}: unknown table {}; known here: {}", path_,
                   value.source().begin.line, key.str(), fmt::join(known, ", "));
     }
+    if (!value.is_table()) {
+      return Fail(ErrorCode::kInvalidArgument, "{}: line {}: {} must be a table", path_,
+                  value.source().begin.line, key.str());
+    }
   }
   return {};
 }

@@ -206,6 +206,21 @@ std::vector<ConfigTable> ConfigTable::Tables(std::string_view key) {
   return tables;
 }
 
+std::vector<std::string> ConfigTable::TableNames() {
+  std::vector<std::string> names;
+  if (node_->table == nullptr) {
+    return names;
+  }
+  for (const auto& [key, value] : *node_->table) {
+    node_->seen.emplace(key.str());
+    if (!value.is_table()) {
+      node_->Fault(ErrorCode::kInvalidArgument, key.str(), "must be a table");
+    }
+    names.emplace_back(key.str());
+  }
+  return names;
+}
+
 void ConfigTable::Reject(std::string_view key, std::string_view what) {
   node_->Fault(ErrorCode::kInvalidArgument, key, what);
 }

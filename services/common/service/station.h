@@ -3,6 +3,7 @@
 
 #include <array>
 #include <string>
+#include <vector>
 
 #include "services/common/config/config.h"
 
@@ -24,10 +25,12 @@ struct Station {
   std::string model;        // model bundle
   std::string features;     // features.toml: dimensions and limits
   std::string results;      // folder for reports and history
-  ConfigFile file;          // the tables of the services
+  // Of this station only: a table [service.NAME] starts forgescan-NAME and holds its settings. Alphabetical.
+  std::vector<std::string> more_services;
+  ConfigFile file;  // the tables of the services
 
   // Reads [station] of FOLDER/station.toml; file members come out as paths that can be opened.
-  // Errors: as ConfigFile; a table nobody knows is an error too.
+  // Errors: as ConfigFile; a table nobody knows, or a service whose name cannot be one, is an error too.
   static Result<Station> Load(const std::string& folder);
 };
 

@@ -309,7 +309,7 @@ TEST_F(Cli, AResultThatStandardOutputCannotTakeIsAnError) {
 
 TEST(StationServices, AreThoseThatTheReportWaitsFor) {
   std::vector<std::string> started;
-  for (const StationService& service : StationServices()) {
+  for (const StationService& service : StationServices({})) {
     started.push_back(service.name);
   }
   EXPECT_EQ(started, std::vector<std::string>(kServiceNames.begin(), kServiceNames.end()));

@@ -99,7 +99,7 @@ Status ShowStatus(const StationOptions& options) {
   ProcessUsage usage;
   std::vector<std::string> names;
   std::vector<TableRow> rows;
-  for (const StationService& service : StationServices()) {
+  for (const StationService& service : StationServices(station)) {
     const auto found = running.services.find(service.name);
     const ServiceProcess process = found == running.services.end() ? ServiceProcess{} : found->second;
     static_cast<void>(usage.Of(process.pid, bus->NowUs()));  // the processor's share is of the time from here

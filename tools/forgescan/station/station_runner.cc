@@ -17,20 +17,20 @@ constexpr std::int64_t kStepUs = 20'000;  // how soon a dead process is noticed
 
 std::string LogFolder(const std::string& folder) { return (std::filesystem::path(folder) / "log").string(); }
 
-std::vector<Supervisor::Member> Members() {
+std::vector<Supervisor::Member> Members(const Station& station) {
   std::vector<Supervisor::Member> members;
-  for (const StationService& service : StationServices()) {
+  for (const StationService& service : StationServices(station)) {
     members.push_back({service.name, service.stage});
   }
   return members;
 }
 
-std::vector<std::string> CommandOf(const std::string& name, const std::string& folder) {
-  for (const StationService& service : StationServices()) {
+std::vector<std::string> CommandOf(const std::string& name, const Station& station) {
+  for (const StationService& service : StationServices(station)) {
     if (service.name == name) {
       std::vector<std::string> command{ProgramFolder() + "/" + service.program};
       command.insert(command.end(), service.arguments.begin(), service.arguments.end());
-      command.insert(command.end(), {"--station", folder});
+      command.insert(command.end(), {"--station", station.folder});
       return command;
     }
   }
@@ -55,9 +55,9 @@ StationRunner::StationRunner(Parts parts)
       log_(std::move(parts.log)),
       bus_(std::move(parts.bus)),
       table_(*bus_),
-      supervisor_(policy_, Members()),
+      supervisor_(policy_, Members(station_)),
       processes_(LogFolder(station_.folder)) {
-  for (const StationService& service : StationServices()) {
+  for (const StationService& service : StationServices(station_)) {
     names_.push_back(service.name);
   }
   SubscribeState<State>(*bus_, kServiceState, [this](const State& state) {
@@ -82,7 +82,7 @@ void StationRunner::Carry(const Supervisor::Actions& actions) {
 }
 
 void StationRunner::Do(const StartProcess& start) {
-  const Status started = processes_.Start(start.service, CommandOf(start.service, station_.folder));
+  const Status started = processes_.Start(start.service, CommandOf(start.service, station_));
   if (!started.ok()) {
     constexpr int kNoProgram = 127;  // as a shell would say
     Carry(supervisor_.OnEnd({start.service, true, kNoProgram, started.error().message}, bus_->NowUs()));
@@ -181,7 +181,7 @@ void StationRunner::StopOne(const std::string& name) {
 }
 
 void StationRunner::StopStage(StationStage stage) {
-  const std::vector<StationService> services = StationServices();
+  const std::vector<StationService> services = StationServices(station_);
   for (auto service = services.rbegin(); service != services.rend(); ++service) {
     if (service->stage == stage && processes_.PidOf(service->name) != 0) {
       StopOne(service->name);

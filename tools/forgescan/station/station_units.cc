@@ -97,7 +97,7 @@ class Units {
 
 std::vector<std::string> Units::Before(const std::string& service) const {
   std::vector<std::string> units;
-  for (const StationService& earlier : StationServices()) {
+  for (const StationService& earlier : StationServices(station_)) {
     if (earlier.name == service) {
       break;
     }
@@ -188,7 +188,7 @@ Result<std::vector<UnitFile>> MakeUnits(const Station& station, const Supervisio
   }
   const Units units(station, policy, options);
   std::vector<UnitFile> files{units.Target(), units.Route()};
-  for (const StationService& service : StationServices()) {
+  for (const StationService& service : StationServices(station)) {
     files.push_back(units.Service(service));
   }
   return files;

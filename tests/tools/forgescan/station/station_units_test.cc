@@ -20,8 +20,10 @@ namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-std::map<std::string, std::string> TextsOf(const std::string& can_url) {
+std::map<std::string, std::string> TextsOf(const std::string& can_url,
+                                           const std::vector<std::string>& more_services = {}) {
   Station station;
+  station.more_services = more_services;
   station.name = "cell-1";
   station.bus_url = "udpm://239.255.76.67:7667?ttl=0";
   station.can_url = can_url;
@@ -38,7 +40,7 @@ std::map<std::string, std::string> TextsOf(const std::string& can_url) {
 
 TEST(StationUnits, OneAServiceATargetAndARoute) {
   const auto texts = TextsOf("socketcan:can0");
-  EXPECT_EQ(texts.size(), 2 + StationServices().size());
+  EXPECT_EQ(texts.size(), 2 + StationServices({}).size());
   const std::string robot = texts.at("forgescan-cell-1-robot.service");
   EXPECT_THAT(robot, HasSubstr("ExecStart=/opt/forgescan/bin/forgescan-robot --station /srv/cell-1\n"));
   EXPECT_THAT(robot, HasSubstr("Type=notify\n"));
@@ -52,6 +54,16 @@ TEST(StationUnits, OneAServiceATargetAndARoute) {
   EXPECT_THAT(camera, Not(HasSubstr("-robot.service"))) << "started before the robot, stopped after it";
   EXPECT_THAT(texts.at("forgescan-cell-1-route.service"), HasSubstr("route replace 239.255.76.67/32 dev lo"));
   EXPECT_THAT(texts.at("forgescan-cell-1.target"), HasSubstr("forgescan-cell-1-report.service"));
+}
+
+TEST(StationUnits, AServiceOfTheStationAloneStartsBehindTheRecorderAndBeforeAllOthers) {
+  const auto texts = TextsOf("socketcan:can0", {"takt"});
+  const std::string takt = texts.at("forgescan-cell-1-takt.service");
+  EXPECT_THAT(takt, HasSubstr("ExecStart=/opt/forgescan/bin/forgescan-takt --station /srv/cell-1\n"));
+  EXPECT_THAT(takt, HasSubstr("-recorder.service\n"));
+  EXPECT_THAT(takt, Not(HasSubstr("-report.service")));
+  EXPECT_THAT(texts.at("forgescan-cell-1-report.service"), HasSubstr("-takt.service"));
+  EXPECT_THAT(texts.at("forgescan-cell-1.target"), HasSubstr("-takt.service"));
 }
 
 TEST(StationUnits, AStationWithCanOverUdpNeedsNoCanSocketsButARouteMore) {
