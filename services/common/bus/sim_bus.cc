@@ -91,6 +91,9 @@ SimBus::~SimBus() {
 
 Status SimBus::Publish(std::string_view channel, ByteView message) {
   RETURN_IF_ERROR(CheckPublish(channel, message));
+  if (send_filter_ && !send_filter_(channel, message)) {
+    return {};
+  }
   network_.Send(std::string(channel), message);
   return {};
 }
@@ -105,13 +108,21 @@ void SimBus::Unsubscribe(SubscriptionId subscription) {
 }
 
 Bus::TimerId SimBus::At(std::int64_t utime, TimerHandler handler) {
-  return timers_.emplace_back(network_.events_.Add(std::max(utime, NowUs()), 0, std::move(handler)));
+  const auto timer = std::make_shared<TimerId>();  // known only when it is set
+  *timer = network_.events_.Add(std::max(utime, NowUs()), 0, [this, timer, handler = std::move(handler)] {
+    timers_.erase(*timer);
+    handler();
+  });
+  return *timers_.insert(*timer).first;
 }
 
 Bus::TimerId SimBus::Every(std::int64_t period_us, TimerHandler handler) {
-  return timers_.emplace_back(network_.events_.Add(NowUs() + period_us, period_us, std::move(handler)));
+  return *timers_.insert(network_.events_.Add(NowUs() + period_us, period_us, std::move(handler))).first;
 }
 
-void SimBus::Cancel(TimerId timer) { network_.events_.Cancel(timer); }
+void SimBus::Cancel(TimerId timer) {
+  network_.events_.Cancel(timer);
+  timers_.erase(timer);
+}
 
 }  // namespace forgescan

@@ -3,9 +3,11 @@
 // node a service; it can lose, duplicate, delay and reorder them like the real one, from a seed.
 #pragma once
 
+#include <functional>
 #include <map>
 #include <memory>
 #include <random>
+#include <set>
 #include <vector>
 
 #include "services/common/bus/bus.h"
@@ -70,6 +72,13 @@ class SimBus final : public Bus {
   void Cancel(TimerId timer) override;
   BusHealth Health() const override { return {}; }
 
+  // What the filter refuses is lost on the way to everybody; the sender does not notice. A node that is to
+  // die without another word refuses everything.
+  using SendFilter = std::function<bool(std::string_view channel, ByteView message)>;
+  void SetSendFilter(SendFilter filter) { send_filter_ = std::move(filter); }
+  // Timers that are set and have not run for the last time.
+  std::size_t timer_count() const { return timers_.size(); }
+
  private:
   friend class SimNetwork;
   SimNetwork& network_;
@@ -79,7 +88,8 @@ class SimBus final : public Bus {
   };
   std::multimap<std::string, Subscription, std::less<>> handlers_;  // by channel
   SubscriptionId last_subscription_ = 0;
-  std::vector<TimerId> timers_;  // set by this node, so that they die with it
+  SendFilter send_filter_;
+  std::set<TimerId> timers_;  // set by this node, so that they die with it
 };
 
 }  // namespace forgescan
