@@ -25,6 +25,7 @@ using testing::SimLine;
 using ::testing::SizeIs;
 
 constexpr int kParts = 3;
+constexpr std::int64_t kNoticeUs = 80'000;      // from the death of a process to the start of the next
 constexpr std::int64_t kSettleUs = 10'000'000;  // until the last part's file is closed
 
 class ReplayLineTest : public ::testing::Test {
@@ -39,6 +40,7 @@ class ReplayLineTest : public ::testing::Test {
     Record("calm", {});
     Record("lossy",
            {.loss = 0.03, .large_loss = 0.3, .duplicate = 0.05, .latency_us = 200, .jitter_us = 3000});
+    RecordKills();
   }
   static void TearDownTestSuite() {
     cell_.reset();
@@ -55,6 +57,34 @@ class ReplayLineTest : public ::testing::Test {
     fs::rename((*line)->StopRecording(), folder_->path() / name);
     EXPECT_EQ((*line)->StreamTotals().missing, 0);
     EXPECT_TRUE(faults.loss == 0.0 || (*line)->StreamTotals().recovered > 0);
+  }
+  // Each service is killed once, and started again as soon as a supervisor notices it.
+  static void RecordKills() {
+    auto line = SimLine::Create(*cell_, kParts + 1);
+    ASSERT_TRUE(line.ok()) << line.error().message;
+    const auto strike = [&line](const std::string& service) {
+      (*line)->Kill(service);
+      (*line)->RunFor(kNoticeUs);
+      const Status started = (*line)->StartAgain(service);
+      ASSERT_TRUE(started.ok()) << started.error().message;
+    };
+    ASSERT_TRUE((*line)->RunUntilViews(1));
+    strike("reconstruction");  // so that part 1 lacks a view
+    ASSERT_TRUE((*line)->RunUntilSorted(1));
+    ASSERT_TRUE((*line)->RunUntilPublished(kFusionResult.name));
+    strike("report");  // of part 2 it has taken results in, and is sent the others while nobody listens
+    ASSERT_TRUE((*line)->RunUntilPublished(kViewResult.name));
+    strike("fusion");  // which forgets the views of part 3 it has
+    strike("registration");
+    ASSERT_TRUE((*line)->RunUntilSorted(kParts + 1));
+    (*line)->RunFor(kSettleUs);
+    const auto& verdicts = (*line)->verdicts();
+    ASSERT_THAT(verdicts, SizeIs(kParts + 1));
+    for (std::size_t i = 0; i < kParts; ++i) {
+      EXPECT_EQ(verdicts[i].verdict, fsmsg::verdict_t::VERDICT_NOT_INSPECTED) << "part " << i + 1;
+    }
+    EXPECT_NE(verdicts[kParts].verdict, fsmsg::verdict_t::VERDICT_NOT_INSPECTED) << verdicts[kParts].reason;
+    fs::rename((*line)->StopRecording(), folder_->path() / "killed");
   }
   static std::vector<std::string> Logs(const std::string& name) {
     std::vector<std::string> logs;
@@ -141,6 +171,14 @@ TEST_F(ReplayLineTest, EachPartReplaysByItself) {
 TEST_F(ReplayLineTest, ASessionRecordedWhileMessagesWereLostReplaysByteForByte) {
   const RecordedSession session = Open(Logs("lossy"));
   ExpectSame(Compute(session, false, {}), session);
+}
+
+TEST_F(ReplayLineTest, ASessionInWhichServicesWereKilledReplaysByteForByte) {
+  const RecordedSession session = Open(Logs("killed"));
+  for (const bool chained : {false, true}) {
+    SCOPED_TRACE(chained ? "chained" : "each by itself");
+    ExpectSame(Compute(session, chained, {}), session);
+  }
 }
 
 TEST_F(ReplayLineTest, TheWholeChainComesToTheSameResults) {

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 
@@ -42,6 +43,15 @@ std::filesystem::path MakeRecordings(const RenderedCell& cell) {
   } while (!std::filesystem::create_directory(folder));
   return folder;
 }
+
+struct Maker {
+  const char* name;
+  Result<std::shared_ptr<void>> (*make)(const ServiceParts&);
+};
+constexpr Maker kMakers[] = {{"reconstruction", MakeReconstructionService},
+                             {"fusion", MakeFusionService},
+                             {"registration", MakeRegistrationService},
+                             {"report", MakeReportService}};
 
 }  // namespace
 
@@ -102,19 +112,35 @@ Status SimLine::MakeCamera(const Station& station, std::size_t side) {
 Status SimLine::MakeComputeServices(const Station& station) {
   std::error_code ignored;  // there may be none
   std::filesystem::remove_all(station.results, ignored);
-  const auto parts = [&](const char* name) -> ServiceParts {
-    return {station, At(name).hub, At(name).monitor};
-  };
-  struct Maker {
-    const char* name;
-    Result<std::shared_ptr<void>> (*make)(const ServiceParts&);
-  };
-  for (const auto& [name, make] : {Maker{"reconstruction", MakeReconstructionService},
-                                   {"fusion", MakeFusionService},
-                                   {"registration", MakeRegistrationService},
-                                   {"report", MakeReportService}}) {
-    ASSIGN_OR_RETURN(compute_services_.emplace_back(), make(parts(name)));
+  for (const auto& [name, make] : kMakers) {
+    ASSIGN_OR_RETURN(compute_services_[name], make({station, At(name).hub, At(name).monitor}));
   }
+  return {};
+}
+
+void SimLine::Kill(const std::string& service) {
+  const auto station = Station::Load(cell_.folder().string());
+  ASSERT_TRUE(station.ok()) << station.error().message;
+  const std::filesystem::path results = station->results, kept = station->results + "-kept";
+  std::filesystem::copy(results, kept, std::filesystem::copy_options::recursive);
+  SimBus& bus = At(service).bus;
+  bus.SetSendFilter([](std::string_view, ByteView) { return false; });
+  compute_services_.erase(service);
+  hosts_.erase(service);
+  network_.RemoveNode(bus);
+  if (service == "report") {  // what its end wrote; the others write nothing
+    std::filesystem::remove_all(results);
+    std::filesystem::rename(kept, results);
+  }
+  std::filesystem::remove_all(kept);
+}
+
+Status SimLine::StartAgain(const std::string& service) {
+  ASSIGN_OR_RETURN(const Station station, Station::Load(cell_.folder().string()));
+  hosts_[service] = std::make_unique<Host>(network_, service);
+  const auto maker = std::find_if(std::begin(kMakers), std::end(kMakers),
+                                  [&service](const auto& known) { return known.name == service; });
+  ASSIGN_OR_RETURN(compute_services_[service], maker->make({station, At(service).hub, At(service).monitor}));
   return {};
 }
 
@@ -181,6 +207,16 @@ bool SimLine::RunUntilSorted(int parts) {
 
 bool SimLine::RunUntilViews(std::size_t views) {
   return network_.RunUntilTrue([&] { return views_.size() >= views; }, kPartPatienceUs);
+}
+
+bool SimLine::RunUntilPublished(const std::string& channel) {
+  const Bytes name(channel.begin(), channel.end());
+  return network_.RunUntilTrue(
+      [&, from = published_.size()] {
+        return std::find(published_.begin() + static_cast<std::ptrdiff_t>(from), published_.end(), name) !=
+               published_.end();
+      },
+      kPartPatienceUs);
 }
 
 StreamCounters SimLine::StreamTotals() const {

@@ -65,6 +65,14 @@ class SimLine {
   // Until the trigger has said "captured" so often.
   bool RunUntilViews(std::size_t views);
   void RunFor(std::int64_t duration_us) { network_.RunFor(duration_us); }
+  // Until a message has come on the channel, from VIEW_CLOUD to VERDICT.
+  bool RunUntilPublished(const std::string& channel);
+
+  // As SIGKILL ends a program: without a word, and with its files as they are. Only reconstruction, fusion,
+  // registration and report.
+  void Kill(const std::string& service);
+  // A new process of one that was killed. Errors: as Create.
+  Status StartAgain(const std::string& service);
 
   const std::vector<fsmsg::view_captured_t>& views() const { return views_; }
   const std::vector<fsmsg::scan_complete_t>& scans() const { return scans_; }
@@ -82,7 +90,7 @@ class SimLine {
 
  private:
   SimLine(RenderedCell& cell, const LineSimConfig& line);
-  Host& At(const char* name) { return *hosts_.at(name); }
+  Host& At(const std::string& name) { return *hosts_.at(name); }
   Status MakeCellServices(const Station& station);
   Status MakeCamera(const Station& station, std::size_t side);
   Status MakeComputeServices(const Station& station);
@@ -105,7 +113,7 @@ class SimLine {
   std::unique_ptr<TriggerService> trigger_service_;
   std::unique_ptr<CoolingService> cooling_service_;
   std::array<std::unique_ptr<CameraService>, 2> camera_services_;
-  std::vector<std::shared_ptr<void>> compute_services_;  // reconstruction, fusion, registration, report
+  std::map<std::string, std::shared_ptr<void>> compute_services_;  // reconstruction, fusion, ... report
   std::unique_ptr<RecorderService> recorder_service_;
   std::string recordings_;
 

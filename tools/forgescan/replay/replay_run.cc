@@ -7,6 +7,7 @@
 #include "services/common/bus/channels.h"
 #include "services/common/bus/stream_header.h"
 #include "tools/forgescan/replay/message_text.h"
+#include "tools/forgescan/replay/recorded_lives.h"
 #include "tools/forgescan/replay/replay_network.h"
 
 namespace forgescan {
@@ -23,19 +24,69 @@ class Run {
       options_.on_result(channel, message);
       Keep(outcome_.comparison.Add(channel, message));
     };
-    const auto add = [&](std::vector<ReplayableService> services) -> Status {
-      ASSIGN_OR_RETURN(auto network,
-                       ReplayNetwork::Create(station, std::move(services), start_us, on_result));
-      networks_.push_back(std::move(network));
-      return {};
+    const auto add = [&](std::vector<ReplayableService> services) {
+      networks_.push_back(std::make_unique<ReplayNetwork>(station, std::move(services), start_us, on_result));
+      return networks_.back().get();
     };
-    if (options_.chained) {
-      return add(options_.services);
-    }
-    for (const ReplayableService& service : options_.services) {
-      RETURN_IF_ERROR(add({service}));
+    ReplayNetwork* all = options_.chained ? add(options_.services) : nullptr;
+    ASSIGN_OR_RETURN(const auto lives, LivesOf(session_, options_.services));
+    for (std::size_t i = 0; i < lives.size(); ++i) {
+      const ReplayableService& service = options_.services[i];
+      ReplayNetwork& network = all != nullptr ? *all : *add({service});
+      for (const RecordedLife& life : lives[i]) {
+        RETURN_IF_ERROR(Plan(network, service.name, life, start_us));
+      }
     }
     return {};
+  }
+
+  // The event with that index: what listens, hears it; what begins or ends with it, does so.
+  Status Step(std::size_t index) {
+    const RecordedEvent& event = session_.events()[index];
+    for (auto [begin, end] = begins_.equal_range(index); begin != end; ++begin) {
+      const auto& [network, name, life] = begin->second;
+      RETURN_IF_ERROR(network->Begin(name, life, event.utime));
+    }
+    RETURN_IF_ERROR(Feed(event));
+    for (auto [begin, end] = last_words_.equal_range(index); begin != end; ++begin) {
+      begin->second.network->NoteLastWord(begin->second.service);
+    }
+    for (auto [begin, end] = ends_.equal_range(index); begin != end; ++begin) {
+      const auto& [network, name, life] = begin->second;
+      RETURN_IF_ERROR(network->End(name, life.how, event.utime));
+    }
+    return std::exchange(problem_, Status());
+  }
+
+  Status Finish() {
+    for (const auto& network : networks_) {
+      network->Finish();
+    }
+    outcome_.comparison.Finish();
+    return problem_;
+  }
+
+ private:
+  struct Planned {
+    ReplayNetwork* network;
+    std::string service;
+    RecordedLife life;
+  };
+
+  Status Plan(ReplayNetwork& network, const std::string& service, const RecordedLife& life,
+              std::int64_t start_us) {
+    if (!life.listened) {
+      return {};
+    }
+    if (life.how != RecordedLife::End::kRunsOn) {
+      last_words_.emplace(life.last_word, Planned{&network, service, life});
+      ends_.emplace(life.end, Planned{&network, service, life});
+    }
+    if (life.begin.has_value()) {
+      begins_.emplace(*life.begin, Planned{&network, service, life});
+      return {};
+    }
+    return network.Begin(service, life, start_us);
   }
 
   Status Feed(const RecordedEvent& event) {
@@ -64,18 +115,9 @@ class Run {
     for (ReplayNetwork* network : receivers) {
       RETURN_IF_ERROR(network->Feed(event.utime, channel, message, lost_before));
     }
-    return std::exchange(problem_, Status());
+    return {};
   }
 
-  Status Finish() {
-    for (const auto& network : networks_) {
-      network->Finish();
-    }
-    outcome_.comparison.Finish();
-    return problem_;
-  }
-
- private:
   void Keep(const Status& status) {
     if (problem_.ok()) {
       problem_ = status;
@@ -94,8 +136,9 @@ class Run {
   const ReplayOptions& options_;
   ReplayOutcome& outcome_;
   std::vector<std::unique_ptr<ReplayNetwork>> networks_;
-  std::map<std::string, StreamHeader> last_;  // fed, by channel
-  Status problem_;                            // the first of the comparison
+  std::multimap<std::size_t, Planned> begins_, last_words_, ends_;  // by the event
+  std::map<std::string, StreamHeader> last_;                        // fed, by channel
+  Status problem_;                                                  // the first of the comparison
 };
 
 }  // namespace
@@ -113,10 +156,9 @@ Result<ReplayOutcome> Replay(const RecordedSession& session, const Station& stat
   }
   Run run(session, options, outcome);
   RETURN_IF_ERROR(run.Start(station));
-  std::size_t done = 0;
-  for (const RecordedEvent& event : session.events()) {
-    RETURN_IF_ERROR(run.Feed(event));
-    options.on_progress(static_cast<double>(++done) / static_cast<double>(session.events().size()));
+  for (std::size_t i = 0; i < session.events().size(); ++i) {
+    RETURN_IF_ERROR(run.Step(i));
+    options.on_progress(static_cast<double>(i + 1) / static_cast<double>(session.events().size()));
   }
   RETURN_IF_ERROR(run.Finish());
   return outcome;

@@ -22,7 +22,7 @@ std::span<const ReplayableService> ReplayableServices() {
         {kRegisteredCloud.name, kRegistration.name},
         {kRegistrationTime.name},
         MakeRegistrationService},
-       {"report", {kVerdict.name}, {}, MakeReportService}}};
+       {"report", {kVerdict.name}, {}, MakeReportService, true}}};
   return services;
 }
 

@@ -16,6 +16,7 @@ struct ReplayableService {
   std::vector<const char*> results;    // channels on which it sends what replay compares
   std::vector<const char*> durations;  // channels on which it sends wall-clock durations: never compared
   Result<std::shared_ptr<void>> (*make)(const ServiceParts& parts);
+  bool keeps_files = false;  // writes to the results folder, and reads there when it starts
 };
 
 // In the order of the chain.
