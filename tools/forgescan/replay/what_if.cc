@@ -12,13 +12,28 @@ namespace forgescan {
 namespace {
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+constexpr std::int8_t kUnknown = fsmsg::verdict_t::VERDICT_UNKNOWN;
 
+DimensionChange& Dimension(const std::string& name, PartChange& change) {
+  const auto known = std::find_if(change.dimensions.begin(), change.dimensions.end(),
+                                  [&name](const auto& other) { return other.name == name; });
+  return known != change.dimensions.end()
+             ? *known
+             : change.dimensions.emplace_back(
+                   DimensionChange{name, kNone, kNone, kNone, kNone, kNone, kNone, kUnknown, kUnknown});
+}
+
+// A verdict that is said again takes the place of the one before.
 void AddRecorded(const fsmsg::verdict_t& verdict, PartChange& change) {
   change.recorded_verdict = verdict.verdict;
   change.recorded_reason = verdict.reason;
   for (const auto& d : verdict.dimensions) {
-    change.dimensions.push_back({d.name, d.lower_mm, d.upper_mm, d.measured_mm, kNone, d.uncertainty_mm,
-                                 kNone, d.verdict, fsmsg::verdict_t::VERDICT_UNKNOWN});
+    DimensionChange& dimension = Dimension(d.name, change);
+    dimension.lower_mm = d.lower_mm;
+    dimension.upper_mm = d.upper_mm;
+    dimension.recorded_mm = d.measured_mm;
+    dimension.recorded_u_mm = d.uncertainty_mm;
+    dimension.recorded_verdict = d.verdict;
   }
 }
 
@@ -26,17 +41,12 @@ void AddNow(const fsmsg::verdict_t& verdict, PartChange& change) {
   change.now_verdict = verdict.verdict;
   change.now_reason = verdict.reason;
   for (const auto& d : verdict.dimensions) {
-    auto known = std::find_if(change.dimensions.begin(), change.dimensions.end(),
-                              [&d](const auto& other) { return other.name == d.name; });
-    if (known == change.dimensions.end()) {
-      change.dimensions.push_back({d.name, 0, 0, kNone, kNone, kNone, kNone, 0, 0});
-      known = std::prev(change.dimensions.end());
-    }
-    known->lower_mm = d.lower_mm;
-    known->upper_mm = d.upper_mm;
-    known->now_mm = d.measured_mm;
-    known->now_u_mm = d.uncertainty_mm;
-    known->now_verdict = d.verdict;
+    DimensionChange& dimension = Dimension(d.name, change);
+    dimension.lower_mm = d.lower_mm;
+    dimension.upper_mm = d.upper_mm;
+    dimension.now_mm = d.measured_mm;
+    dimension.now_u_mm = d.uncertainty_mm;
+    dimension.now_verdict = d.verdict;
   }
 }
 

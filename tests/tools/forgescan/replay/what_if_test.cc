@@ -63,6 +63,14 @@ TEST(WhatIf, TheSameNumberAtAnotherTimeIsAnotherPart) {
   EXPECT_EQ(CompareVerdicts({Verdict(1, kOk, 10)}, {again}).size(), 2u);
 }
 
+TEST(WhatIf, AVerdictSaidAgainIsOneVerdict) {
+  const auto parts = CompareVerdicts({Verdict(1, kOk, 10), Verdict(1, kOk, 10)},
+                                     {Verdict(1, kOk, 10), Verdict(1, kOk, 10), Verdict(1, kOk, 10)});
+  ASSERT_EQ(parts.size(), 1u);
+  EXPECT_EQ(parts[0].dimensions.size(), 1u);
+  EXPECT_FALSE(parts[0].Flipped() || parts[0].dimensions[0].Flipped());
+}
+
 TEST(WhatIf, ThePageShowsEveryPartAndEscapesWhatItIsTold) {
   const auto parts = CompareVerdicts({Verdict(1, kOk, 10)}, {Verdict(1, kNotOk, 11.25)});
   const std::string page = WhatIfHtml({"<east>", {"a&b.lcmlog"}, {"fusion.x = 1"}}, parts);
