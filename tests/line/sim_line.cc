@@ -188,6 +188,7 @@ void SimLine::Record(const char* channel) {
 
 // What the cameras see at an edge: the view the robot holds, of the part in place.
 void SimLine::Expose(const TriggerSim::Edge& edge) {
+  ++exposed_;
   const int part = static_cast<int>(line_.part().part);
   const auto view = cell_.View(part, edge.view);
   ASSERT_TRUE(view.ok()) << view.error().message;
@@ -207,6 +208,10 @@ bool SimLine::RunUntilSorted(int parts) {
 
 bool SimLine::RunUntilViews(std::size_t views) {
   return network_.RunUntilTrue([&] { return views_.size() >= views; }, kPartPatienceUs);
+}
+
+bool SimLine::RunUntilExposed(int images) {
+  return network_.RunUntilTrue([&] { return exposed_ >= images; }, 3 * kPartPatienceUs);
 }
 
 bool SimLine::RunUntilPublished(const std::string& channel) {

@@ -64,6 +64,8 @@ class SimLine {
   bool RunUntilSorted(int parts);
   // Until the trigger has said "captured" so often.
   bool RunUntilViews(std::size_t views);
+  // Until so many images have been exposed, of both cameras and all parts.
+  bool RunUntilExposed(int images);
   void RunFor(std::int64_t duration_us) { network_.RunFor(duration_us); }
   // Until a message has come on the channel, from VIEW_CLOUD to VERDICT.
   bool RunUntilPublished(const std::string& channel);
@@ -107,6 +109,7 @@ class SimLine {
   CoolingSim cooling_;
   std::array<std::unique_ptr<CameraSim>, 2> cameras_;  // left, right
   std::optional<LostFrame> lost_frame_;
+  int exposed_ = 0;  // images
 
   std::map<std::string, std::unique_ptr<Host>> hosts_;
   std::unique_ptr<RobotService> robot_service_;
