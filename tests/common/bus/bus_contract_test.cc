@@ -156,6 +156,36 @@ TEST_P(BusContract, AHandlerMaySubscribeAndPublish) {
   EXPECT_TRUE(pair_->RunUntilTrue([&] { return answered; }, kPatienceUs));
 }
 
+TEST(SimBus, ForgetsTimersThatHaveRun) {
+  SimNetwork network;
+  SimBus& bus = network.AddNode();
+  int runs = 0;
+  for (int i = 0; i < 3; ++i) {
+    bus.At(bus.NowUs() + 10 * i, [&runs] { ++runs; });
+  }
+  const auto repeated = bus.Every(1000, [] {});
+  bus.Cancel(bus.At(bus.NowUs() + 50, [&runs] { ++runs; }));
+  EXPECT_EQ(bus.timer_count(), 4u);
+  network.RunFor(2500);
+  EXPECT_EQ(runs, 3);
+  EXPECT_EQ(bus.timer_count(), 1u);
+  bus.Cancel(repeated);
+  EXPECT_EQ(bus.timer_count(), 0u);
+}
+
+TEST(SimBus, WhatItsFilterRefusesReachesNobody) {
+  SimNetwork network;
+  SimBus &sender = network.AddNode(), &receiver = network.AddNode();
+  std::vector<Bytes> heard;
+  receiver.Subscribe("X", [&heard](ByteView message) { heard.emplace_back(message.begin(), message.end()); });
+  sender.SetSendFilter([](std::string_view, ByteView message) { return message[0] != 2; });
+  for (const std::uint8_t byte : {1, 2, 3}) {
+    ASSERT_TRUE(sender.Publish("X", Bytes{byte}).ok());
+  }
+  network.RunFor(10'000);
+  EXPECT_EQ(heard, (std::vector<Bytes>{{1}, {3}}));
+}
+
 INSTANTIATE_TEST_SUITE_P(Buses, BusContract, ::testing::Values(Kind::kSim, Kind::kLcm),
                          [](const auto& param) { return param.param == Kind::kSim ? "SimBus" : "LcmBus"; });
 
