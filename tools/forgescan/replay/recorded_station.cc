@@ -1,6 +1,9 @@
 #include "tools/forgescan/replay/recorded_station.h"
 
+#include <fmt/ranges.h>
+
 #include <algorithm>
+#include <array>
 #include <fstream>
 #include <iterator>
 #include <sstream>
@@ -20,12 +23,13 @@ constexpr const char* kStationFile = "station.toml";
 struct Role {
   const char* name;
   std::string Station::*path;
+  std::array<std::string_view, 2> services;  // that read it
 };
-constexpr Role kRoles[] = {{"calibration", &Station::calibration},
-                           {"pattern", &Station::pattern},
-                           {"views", &Station::views},
-                           {"model", &Station::model},
-                           {"features", &Station::features}};
+constexpr Role kRoles[] = {{"calibration", &Station::calibration, {"reconstruction"}},
+                           {"pattern", &Station::pattern, {"reconstruction"}},
+                           {"views", &Station::views, {"fusion"}},
+                           {"model", &Station::model, {"registration", "report"}},
+                           {"features", &Station::features, {"report"}}};
 
 Result<std::string> ReadText(const fs::path& path) {
   std::ifstream stream(path, std::ios::binary);
@@ -72,6 +76,11 @@ Status SetValue(toml::table& table, const std::string& change) {
   const toml::table* from = &parsed;
   toml::table* to = &table;
   for (;;) {
+    if (from->size() != 1) {
+      return Fail(ErrorCode::kInvalidArgument,
+                  "--set {}: gives {} values; wanted is one, table.key=value; repeat --set for more", change,
+                  from->size());
+    }
     const auto only = from->begin();
     const toml::table* below = only->second.as_table();
     if (below == nullptr) {
@@ -146,7 +155,37 @@ Result<std::string> UnpackFile(const RecordedSession& session, const StationChan
   return path.string();
 }
 
+// The table that a change of a value is in: "fusion" of "fusion.view_timeout_s=30".
+std::string TableOf(const std::string& change) {
+  std::string table = change.substr(0, change.find_first_of(".="));
+  std::erase_if(table, [](char c) { return c == ' ' || c == '\t' || c == '"' || c == '\''; });
+  return table;
+}
+
 }  // namespace
+
+Status CheckUsed(const StationChanges& changes, const std::vector<std::string>& services) {
+  const auto computed = [&services](std::string_view name) {
+    return std::find(services.begin(), services.end(), name) != services.end();
+  };
+  for (const std::string& change : changes.values) {
+    if (const std::string table = TableOf(change); !computed(table)) {
+      return Fail(
+          ErrorCode::kInvalidArgument,
+          "--set {}: nothing that is computed here reads [{}], so it would change nothing; read are [{}]",
+          change, table, fmt::join(services, "], ["));
+    }
+  }
+  for (const Role& role : kRoles) {
+    if (changes.files.contains(role.name) && std::ranges::none_of(role.services, computed)) {
+      return Fail(ErrorCode::kInvalidArgument,
+                  "--{0}: nothing that is computed here reads the file for {0}, so it would change nothing; "
+                  "computed are {1}",
+                  role.name, fmt::join(services, ", "));
+    }
+  }
+  return {};
+}
 
 Result<Station> UnpackStation(const RecordedSession& session, const StationChanges& changes,
                               const fs::path& folder) {

@@ -19,6 +19,10 @@ struct StationChanges {
   bool Any() const { return !config.empty() || !values.empty() || !files.empty(); }
 };
 
+// Errors: kInvalidArgument (a change of a value or file that none of the services reads, which are named as
+// in ReplayableService: it would change nothing).
+Status CheckUsed(const StationChanges& changes, const std::vector<std::string>& services);
+
 // Writes the recorded files with the changes to `folder` (which exists and is empty) and loads the station
 // from it. Results go to `folder`/results. Errors: kNotFound (a file the station needs is not in the
 // recording, or a file the user named does not exist), kInvalidArgument (a value that is no table.key=value),

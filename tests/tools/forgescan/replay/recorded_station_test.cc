@@ -101,12 +101,30 @@ TEST_F(RecordedStationTest, TakesAnotherConfigurationAndOtherFiles) {
 }
 
 TEST_F(RecordedStationTest, RefusesWhatIsNoValue) {
-  for (const char* change : {"fusion", "view_timeout_s=3", "fusion.view_timeout_s=",
-                             "fusion.view_timeout_s=a b", "fusion.view_timeout_s.x=1"}) {
+  for (const char* change :
+       {"fusion", "view_timeout_s=3", "fusion.view_timeout_s=", "fusion.view_timeout_s=a b",
+        "fusion.view_timeout_s.x=1", "fusion.x={}", "report.uncertainty={a=1,b=2}",
+        "#fusion.view_timeout_s=1", "fusion.view_timeout_s=1\nfusion.max_body_change_k=2"}) {
     const auto station = Unpack({.config = "", .values = {change}, .files = {}});
     ASSERT_FALSE(station.ok()) << change;
     EXPECT_THAT(station.error().message, HasSubstr(change));
   }
+}
+
+TEST_F(RecordedStationTest, RefusesAChangeThatNothingComputedReads) {
+  const auto check = [](const StationChanges& changes, const std::vector<std::string>& services) {
+    const Status status = CheckUsed(changes, services);
+    return status.ok() ? "" : status.error().message;
+  };
+  const StationChanges cooling{.config = "", .values = {"cooling.setpoint_degc=20"}, .files = {}};
+  EXPECT_THAT(check(cooling, {"fusion", "report"}),
+              HasSubstr("nothing that is computed here reads [cooling]"));
+  const StationChanges fusion{.config = "", .values = {" \"fusion\" .view_timeout_s=20"}, .files = {}};
+  EXPECT_EQ(check(fusion, {"fusion"}), "");
+  EXPECT_THAT(check(fusion, {"report"}), HasSubstr("reads [fusion]"));
+  const StationChanges views{.config = "", .values = {}, .files = {{"views", "v.toml"}}};
+  EXPECT_EQ(check(views, {"fusion"}), "");
+  EXPECT_THAT(check(views, {"report"}), HasSubstr("the file for views"));
 }
 
 TEST_F(RecordedStationTest, NamesAFileThatWasNotRecorded) {
