@@ -1,12 +1,16 @@
 #include "tools/forgescan/replay/recorded_session.h"
 
 #include <algorithm>
+#include <cmath>
+#include <map>
 #include <set>
 #include <string_view>
+#include <tuple>
 
 #include "services/common/bus/channel_list.h"
 #include "services/common/bus/channels.h"
 #include "services/common/bus/codec.h"
+#include "tools/forgescan/log/closing_check.h"
 
 namespace forgescan {
 namespace {
@@ -25,10 +29,47 @@ Result<Message> ReadAs(const LogReader& log, const LogEntry& entry) {
                              message.error().message);
 }
 
-std::string Sentence(const LogReader& log, const fsmsg::recording_gap_t& gap) {
-  return gap.first_sequence > 0 ? fmt::format("{}: {} {} to {} are missing: {}", log.path(), gap.channel,
-                                              gap.first_sequence, gap.last_sequence, gap.reason)
-                                : fmt::format("{}: {}: {}", log.path(), gap.channel, gap.reason);
+// What the recording says of itself against what there is. Errors: kIo.
+Result<std::vector<std::string>> FindingsOf(const Recording& recording) {
+  const LogReader& log = recording.log;
+  std::vector<std::string> sentences;
+  for (const LogDamage& damage : log.damage()) {
+    sentences.push_back(
+        fmt::format("{}: {} bytes at byte {}: {}", log.path(), damage.bytes, damage.offset, damage.what));
+  }
+  ClosingCheck check(recording);
+  std::vector<LogFinding> findings;
+  for (const LogEntry& entry : log.entries()) {
+    ASSIGN_OR_RETURN(const Bytes message, log.Read(entry));
+    check.Add(entry, message, findings);
+  }
+  check.Finish(findings);
+  for (const LogFinding& finding : findings) {
+    const std::string where = finding.offset.has_value() ? fmt::format(", byte {}", *finding.offset) : "";
+    sentences.push_back(fmt::format("{}{}: {} {}", log.path(), where, finding.channel, finding.what));
+  }
+  return sentences;
+}
+
+// Messages are recorded within seconds of their event (a verdict within the minutes of a scan), and a station
+// that runs is never silent for longer.
+constexpr std::int64_t kStepUs = 10 * 60'000'000LL;
+
+bool FarApart(std::int64_t a_us, std::int64_t b_us) {
+  const auto a = static_cast<double>(a_us), b = static_cast<double>(b_us);  // any bits: no overflow
+  return std::abs(a - b) > static_cast<double>(kStepUs);
+}
+
+// A wrong bit in an event's time: far from its neighbour's and from that of its own message, which begins
+// with it. Errors: kIo.
+Result<bool> HasWrongTime(const LogReader& log, std::size_t entry, std::int64_t neighbour_us) {
+  const LogEntry& event = log.entries()[entry];
+  if (!FarApart(event.utime, neighbour_us)) {
+    return false;
+  }
+  ASSIGN_OR_RETURN(const Bytes start, log.Read(event, kStreamHeaderBytes));
+  const auto utime = StreamUtime(start);
+  return !utime.ok() || FarApart(event.utime, *utime);
 }
 
 }  // namespace
@@ -36,8 +77,8 @@ std::string Sentence(const LogReader& log, const fsmsg::recording_gap_t& gap) {
 Result<RecordedSession> RecordedSession::Open(const std::vector<std::string>& paths) {
   RecordedSession session;
   for (const std::string& path : paths) {
-    ASSIGN_OR_RETURN(LogReader log, LogReader::Open(path));
-    RETURN_IF_ERROR(session.Add(std::move(log)));
+    ASSIGN_OR_RETURN(Recording recording, OpenRecording(path));
+    RETURN_IF_ERROR(session.Add(std::move(recording)));
   }
   RETURN_IF_ERROR(session.Merge());
   return session;
@@ -79,29 +120,21 @@ std::int64_t RecordedSession::LostBetween(const std::string& channel, const Stre
   return lost;
 }
 
-Status RecordedSession::Add(LogReader log) {
-  bool opened = false, closed = false;
-  for (const LogEntry& entry : log.entries()) {
-    const std::string& channel = log.ChannelOf(entry);
-    opened = opened || channel == kRecordingOpened.name;
-    closed = closed || channel == kRecordingClosed.name;
-    if (IsAddition(channel)) {
-      RETURN_IF_ERROR(AddAddition(log, entry));
-    }
-  }
-  if (!opened) {
+Status RecordedSession::Add(Recording recording) {
+  const LogReader& log = recording.log;
+  if (!recording.opened.has_value()) {
     return Fail(ErrorCode::kFormat,
                 "{} holds no {} event: it is not a recording of forgescan, and cannot be computed again",
                 log.path(), kRecordingOpened.name);
   }
-  for (const LogDamage& damage : log.damage()) {
-    findings_.push_back(
-        fmt::format("{}: {} bytes at byte {}: {}", log.path(), damage.bytes, damage.offset, damage.what));
+  for (const LogEntry& entry : log.entries()) {
+    if (IsAddition(log.ChannelOf(entry))) {
+      RETURN_IF_ERROR(AddAddition(log, entry));
+    }
   }
-  if (!closed) {
-    findings_.push_back(fmt::format("{}: the recording was not closed, its end is missing", log.path()));
-  }
-  logs_.push_back(std::move(log));
+  ASSIGN_OR_RETURN(const auto findings, FindingsOf(recording));
+  findings_.insert(findings_.end(), findings.begin(), findings.end());
+  logs_.push_back(std::move(recording.log));
   return {};
 }
 
@@ -113,10 +146,7 @@ Status RecordedSession::AddAddition(const LogReader& log, const LogEntry& entry)
   }
   if (channel == kRecordingClosed.name) {
     ASSIGN_OR_RETURN(const auto closed, ReadAs<fsmsg::recording_closed_t>(log, entry));
-    for (const auto& gap : closed.gaps) {
-      findings_.push_back(Sentence(log, gap));
-      gaps_.push_back(gap);
-    }
+    gaps_.insert(gaps_.end(), closed.gaps.begin(), closed.gaps.end());
     return {};
   }
   ASSIGN_OR_RETURN(auto opened, ReadAs<fsmsg::recording_opened_t>(log, entry));
@@ -146,20 +176,64 @@ Status RecordedSession::AddFile(const LogReader& log, fsmsg::recorded_file_t fil
 
 Status RecordedSession::Merge() {
   for (std::size_t log = 0; log < logs_.size(); ++log) {
-    const auto& entries = logs_[log].entries();
-    std::int64_t utime = 0;
-    for (std::size_t i = 0; i < entries.size(); ++i) {
-      utime = std::max(utime, entries[i].utime);
-      if (!IsAddition(logs_[log].ChannelOf(entries[i]))) {
-        events_.push_back({log, i, utime});
-      }
-    }
+    RETURN_IF_ERROR(AddEvents(log));
   }
   std::stable_sort(events_.begin(), events_.end(),
                    [](const auto& a, const auto& b) { return a.utime < b.utime; });
   if (logs_.size() == 1) {
     return {};
   }
+  RETURN_IF_ERROR(RefuseMessagesHeldTwice());
+  return LeaveOutStatesHeldTwice();
+}
+
+Status RecordedSession::AddEvents(std::size_t log) {
+  const LogReader& reader = logs_[log];
+  const auto& entries = reader.entries();
+  std::int64_t utime = 0;
+  for (std::size_t i = 0; i < entries.size(); ++i) {
+    const bool is_first = i == 0;
+    const std::int64_t next_us = entries[std::min(i + 1, entries.size() - 1)].utime;
+    const std::int64_t neighbour_us = is_first ? next_us : utime;
+    ASSIGN_OR_RETURN(const bool wrong, HasWrongTime(reader, i, neighbour_us));
+    if (wrong) {
+      findings_.push_back(
+          fmt::format("{}, event {} at byte {}: its time, {} us, is minutes off; taken is {} us",
+                      reader.path(), i, entries[i].offset, entries[i].utime, neighbour_us));
+    }
+    utime = std::max(utime, wrong ? neighbour_us : entries[i].utime);
+    if (!IsAddition(reader.ChannelOf(entries[i]))) {
+      events_.push_back({log, i, utime});
+    }
+  }
+  return {};
+}
+
+// Parts that overlap share states, no messages of streams.
+Status RecordedSession::RefuseMessagesHeldTwice() const {
+  std::map<std::tuple<std::string, std::int64_t, std::int64_t>, std::size_t> held;  // to the log
+  for (const RecordedEvent& event : events_) {
+    const std::string& channel = ChannelOf(event);
+    if (IsStateChannel(channel)) {
+      continue;
+    }
+    ASSIGN_OR_RETURN(const Bytes start, ReadStart(event, kStreamHeaderBytes));
+    const auto header = ReadStreamHeader(start);
+    if (!header.ok()) {
+      continue;  // found out when it is used
+    }
+    const auto [known, is_new] =
+        held.emplace(std::tuple(channel, header->session, header->sequence), event.log);
+    if (!is_new && known->second != event.log) {
+      return Fail(ErrorCode::kInvalidArgument,
+                  "{} and {} hold the same message, {} {}: give each recording once",
+                  logs_[known->second].path(), logs_[event.log].path(), channel, header->sequence);
+    }
+  }
+  return {};
+}
+
+Status RecordedSession::LeaveOutStatesHeldTwice() {
   std::set<std::pair<std::string, Bytes>> states;  // small, and a second or less apart
   std::vector<RecordedEvent> once;
   for (const RecordedEvent& event : events_) {

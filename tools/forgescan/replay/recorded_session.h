@@ -13,6 +13,7 @@
 #include "services/common/log/lcm_type.h"
 #include "services/common/log/log_reader.h"
 #include "services/common/result.h"
+#include "tools/forgescan/log/recording.h"
 
 namespace forgescan {
 
@@ -24,9 +25,10 @@ struct RecordedEvent {
 
 class RecordedSession {
  public:
-  // Errors: as LogReader::Open; kFormat (a log without RECORDING_OPENED: not a recording of forgescan);
-  // kInvalidArgument (recordings of different stations or with different files: each has to be replayed by
-  // itself).
+  // Reads everything once, to hold it against what the recordings say of themselves. Errors: as
+  // LogReader::Open; kFormat (a log without RECORDING_OPENED: not a recording of forgescan); kInvalidArgument
+  // (recordings of different stations or with different files: each has to be replayed by itself; recordings
+  // that hold the same message).
   static Result<RecordedSession> Open(const std::vector<std::string>& paths);
 
   // Events of the bus, without what the recorder added. A state message that several recordings hold is there
@@ -46,15 +48,20 @@ class RecordedSession {
   // How many messages of a channel the recordings lost between two that they hold.
   std::int64_t LostBetween(const std::string& channel, const StreamHeader& before,
                            const StreamHeader& after) const;
-  // Why the session is not whole, one sentence each: damage, no closing event, gaps. Empty = whole.
+  // Why the session is not whole, one sentence each: damage, no closing event, gaps, counts and checksums of
+  // the closing event or the station's files, times that cannot be. Empty = whole.
   const std::vector<std::string>& findings() const { return findings_; }
   std::int64_t duration_us() const;
 
  private:
-  Status Add(LogReader log);
+  Status Add(Recording recording);
   Status AddAddition(const LogReader& log, const LogEntry& entry);
   Status AddFile(const LogReader& log, fsmsg::recorded_file_t file);
   Status Merge();
+  // The events of one log in its order.
+  Status AddEvents(std::size_t log);
+  Status LeaveOutStatesHeldTwice();
+  Status RefuseMessagesHeldTwice() const;
 
   std::vector<LogReader> logs_;
   std::vector<RecordedEvent> events_;

@@ -10,6 +10,7 @@ namespace {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 using testing::kSession;
 using testing::TestFolder;
 using testing::WrittenRecording;
@@ -88,6 +89,63 @@ TEST(RecordedSession, TimeNeverGoesBack) {
   EXPECT_THAT(TimesAfter(*session), ElementsAre(50, 50));
 }
 
+TEST(RecordedSession, AWrongBitInATimeIsNamedAndTheNeighboursTimeTaken) {
+  const TestFolder folder;
+  for (const std::size_t wrong : {0, 2, 4}) {  // of: opening, three messages, closing
+    const std::string path = folder / (std::to_string(wrong) + ".lcmlog");
+    WrittenRecording recording(path);
+    for (int i = 1; i <= 3; ++i) {
+      recording.Stream(kPartArrived, Arrived(i, 10 * i), i);
+    }
+    recording.CloseAfter([wrong](auto& events) { events[wrong].utime ^= std::int64_t{1} << 50; });
+    const auto session = RecordedSession::Open({path});
+    ASSERT_TRUE(session.ok()) << session.error().message;
+    EXPECT_THAT(session->findings(), ElementsAre(HasSubstr(fmt::format("event {} at byte", wrong))));
+    EXPECT_THAT(TimesAfter(*session), ElementsAre(10, wrong == 2 ? 10 : 20, 30));
+  }
+}
+
+TEST(RecordedSession, ALongSilenceIsNoWrongTime) {
+  const TestFolder folder;
+  WrittenRecording recording(folder / "one.lcmlog");
+  recording.Stream(kPartArrived, Arrived(1, 10), 1);
+  recording.Stream(kPartArrived, Arrived(2, 3'600'000'000), 2);
+  recording.Close();
+  const auto session = RecordedSession::Open({folder / "one.lcmlog"});
+  ASSERT_TRUE(session.ok()) << session.error().message;
+  EXPECT_THAT(session->findings(), IsEmpty());
+  EXPECT_THAT(TimesAfter(*session), ElementsAre(10, 3'600'000'000));
+}
+
+TEST(RecordedSession, HoldsWhatThereIsAgainstWhatTheRecordingSaysOfItself) {
+  const TestFolder folder;
+  WrittenRecording lacking(folder / "lacking.lcmlog"), changed(folder / "changed.lcmlog");
+  for (WrittenRecording* recording : {&lacking, &changed}) {
+    recording->File("station.toml", "a = 1");
+    recording->Stream(kPartArrived, Arrived(1, 10), 1);
+  }
+  lacking.CloseAfter([](auto& events) { events.erase(events.begin() + 2); });
+  const auto less = RecordedSession::Open({folder / "lacking.lcmlog"});
+  ASSERT_TRUE(less.ok()) << less.error().message;
+  EXPECT_THAT(less->findings(), ElementsAre(HasSubstr("PART_ARRIVED the closing event counts 1 events")));
+  changed.CloseAfter([](auto& events) { events[1].message.back() ^= 1; });
+  const auto other = RecordedSession::Open({folder / "changed.lcmlog"});
+  ASSERT_TRUE(other.ok()) << other.error().message;
+  EXPECT_THAT(other->findings(), ::testing::Contains(HasSubstr("station.toml has the CRC-32")));
+}
+
+TEST(RecordedSession, RefusesAMessageThatTwoRecordingsHold) {
+  const TestFolder folder;
+  for (const char* name : {"a.lcmlog", "b.lcmlog"}) {
+    WrittenRecording recording(folder / name);
+    recording.Stream(kPartArrived, Arrived(1, 10), 7);
+    recording.Close();
+  }
+  const auto twice = RecordedSession::Open({folder / "a.lcmlog", folder / "b.lcmlog"});
+  ASSERT_FALSE(twice.ok());
+  EXPECT_THAT(twice.error().message, HasSubstr("hold the same message, PART_ARRIVED 7"));
+}
+
 TEST(RecordedSession, NamesWhatIsNotWhole) {
   const TestFolder folder;
   {
@@ -96,7 +154,7 @@ TEST(RecordedSession, NamesWhatIsNotWhole) {
   }
   const auto unclosed = RecordedSession::Open({folder / "open.lcmlog.part"});
   ASSERT_TRUE(unclosed.ok()) << unclosed.error().message;
-  EXPECT_THAT(unclosed->findings(), ElementsAre(HasSubstr("was not closed")));
+  EXPECT_THAT(unclosed->findings(), ElementsAre(HasSubstr("RECORDING_CLOSED is missing")));
 
   WrittenRecording recording(folder / "gap.lcmlog");
   recording.Stream(kPartArrived, Arrived(1, 10), 4);
@@ -104,7 +162,8 @@ TEST(RecordedSession, NamesWhatIsNotWhole) {
   recording.Close({{"PART_ARRIVED", kSession, 5, 6, "given up"}});
   const auto gap = RecordedSession::Open({folder / "gap.lcmlog"});
   ASSERT_TRUE(gap.ok()) << gap.error().message;
-  EXPECT_THAT(gap->findings(), ElementsAre(HasSubstr("PART_ARRIVED 5 to 6 are missing: given up")));
+  EXPECT_THAT(gap->findings(),
+              ElementsAre(HasSubstr("PART_ARRIVED the closing event names a gap: sequence 5 to 6")));
   EXPECT_EQ(gap->LostBetween("PART_ARRIVED", {kSession, 4}, {kSession, 9}), 2);
   EXPECT_EQ(gap->LostBetween("PART_ARRIVED", {kSession, 6}, {kSession, 9}), 0);
   EXPECT_EQ(gap->LostBetween("VIEW_READY", {kSession, 4}, {kSession, 9}), 0);
