@@ -1,7 +1,9 @@
 // forgescan replay LOG...
+#include <fmt/ranges.h>
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
@@ -14,6 +16,7 @@
 #include "tools/forgescan/replay/replay_run.h"
 #include "tools/forgescan/replay/scratch_folder.h"
 #include "tools/forgescan/replay/what_if.h"
+#include "tools/forgescan/station/interrupt.h"
 
 namespace forgescan {
 namespace {
@@ -86,68 +89,126 @@ StationChanges WithThreads(StationChanges changes, int threads) {
   return changes;
 }
 
-Status Judge(const RecordedSession& session, const ReplayOutcome& outcome) {
+// What is wrong with the recording itself.
+Status JudgeRecording(const RecordedSession& session, const ReplayOutcome& outcome) {
   if (!outcome.changed_inputs.empty()) {
     return Fail(ErrorCode::kUntrusted, "{} recorded messages are not as they were sent",
                 outcome.changed_inputs.size());
   }
-  if (!outcome.comparison.Same()) {
-    return Fail(ErrorCode::kUntrusted, "the replay's results are not those of the recording");
-  }
   if (!session.findings().empty()) {
-    return Fail(ErrorCode::kUntrusted, "what there is replays equally, but the recording is not whole");
+    return Fail(ErrorCode::kUntrusted, "the recording is not whole");
   }
   return {};
 }
 
-Status WriteWhatIf(const RecordedSession& session, const ReplayArguments& arguments,
-                   const std::vector<std::string>& changes, const std::vector<fsmsg::verdict_t>& now) {
+Status Judge(const RecordedSession& session, const ReplayOutcome& outcome) {
+  const ChannelComparison total = outcome.comparison.Total();
+  if (outcome.changed_inputs.empty() && total.equal + total.differing + total.missing == 0) {
+    return Fail(ErrorCode::kUntrusted,
+                "there is nothing to compare: the recording holds no result of these services");
+  }
+  if (outcome.changed_inputs.empty() && !session.findings().empty() && total.differing + total.missing == 0) {
+    return Fail(ErrorCode::kUntrusted,
+                "what there is replays equally, but the recording is not whole; {} results are not in it",
+                total.extra);
+  }
+  RETURN_IF_ERROR(JudgeRecording(session, outcome));
+  return total.Same() ? Status()
+                      : Fail(ErrorCode::kUntrusted, "the replay's results are not those of the recording");
+}
+
+Status WriteWhatIf(const RecordedSession& session, const ReplayArguments& arguments, const WhatIfPage& page,
+                   const std::vector<fsmsg::verdict_t>& now) {
   ASSIGN_OR_RETURN(const auto recorded, RecordedVerdicts(session));
   const auto parts = CompareVerdicts(recorded, now);
   fmt::print("{}", WhatIfText(parts));
-  if (arguments.report.empty()) {
-    return {};
-  }
-  return WriteOutputFile(arguments.report,
-                         WhatIfHtml({session.opened().station, arguments.logs, changes}, parts));
+  return arguments.report.empty() ? Status() : WriteOutputFile(arguments.report, WhatIfHtml(page, parts));
 }
 
-Status RunReplay(const ReplayArguments& arguments) {
-  spdlog::set_level(spdlog::level::off);  // what the services had to say is in the recording
-  ASSIGN_OR_RETURN(const auto session, RecordedSession::Open(arguments.logs));
-  ASSIGN_OR_RETURN(const ScratchFolder scratch, ScratchFolder::Make());
-  ASSIGN_OR_RETURN(Station station,
-                   UnpackStation(session, WithThreads(arguments.changes, arguments.threads), scratch.path()));
-  if (!arguments.results.empty()) {
-    station.results = arguments.results;
+bool GivesVerdicts(const std::vector<ReplayableService>& services) {
+  return std::any_of(services.begin(), services.end(),
+                     [](const auto& service) { return std::string_view(service.name) == "report"; });
+}
+
+// Errors: kInvalidArgument (a change or page that these services cannot make).
+Status CheckArguments(const ReplayArguments& arguments, const std::vector<ReplayableService>& services) {
+  std::vector<std::string> names;
+  for (const ReplayableService& service : services) {
+    names.emplace_back(service.name);
   }
-  ReplayOptions options;
-  ASSIGN_OR_RETURN(options.services, SelectServices(arguments.services));
-  const bool what_if = arguments.changes.Any() || !arguments.report.empty();
-  options.chained = what_if;
-  ASSIGN_OR_RETURN(const auto changes, DescribeChanges(session, station));
-  PrintSome("changed", changes);
-  PrintSome("recording", session.findings());
-  std::vector<fsmsg::verdict_t> verdicts;
-  options.on_result = [&verdicts](const std::string& channel, ByteView message) {
-    if (auto verdict = Decode<fsmsg::verdict_t>(message); channel == kVerdict.name && verdict.ok()) {
-      verdicts.push_back(std::move(*verdict));
-    }
-  };
-  const auto progress = std::make_unique<ProgressLine>();
-  options.on_progress = [&progress](double share) { progress->Show(share); };
-  const auto started = std::chrono::steady_clock::now();
-  ASSIGN_OR_RETURN(const auto outcome, Replay(session, station, options));
-  const double took_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
+  if (!arguments.report.empty() && !GivesVerdicts(services)) {
+    return Fail(ErrorCode::kInvalidArgument,
+                "--report compares verdicts, which the service report gives; computed are {}",
+                fmt::join(names, ", "));
+  }
+  return CheckUsed(arguments.changes, names);
+}
+
+// Into the user's folder, beside what is there. Errors: kIo.
+Status KeepResults(const fs::path& results, const std::string& folder) {
+  std::error_code problem;
+  if (folder.empty() || !fs::exists(results, problem)) {
+    return {};
+  }
+  fs::create_directories(folder, problem);
+  fs::copy(results, folder, fs::copy_options::recursive | fs::copy_options::overwrite_existing, problem);
+  return problem ? Fail(ErrorCode::kIo, "the reports cannot be written to {}: {}", folder, problem.message())
+                 : Status();
+}
+
+void PrintOutcome(const RecordedSession& session, const ReplayOutcome& outcome, double took_s) {
   PrintSome("changed input", outcome.changed_inputs);
   PrintComparison(session.types(), outcome.comparison);
   const double recorded_s = static_cast<double>(session.duration_us()) * 1e-6;
   fmt::print("{:.1f} s of recording in {:.1f} s, {:.1f} times as fast\n", recorded_s, took_s,
              recorded_s / took_s);
-  if (what_if) {
-    return WriteWhatIf(session, arguments, changes, verdicts);
+}
+
+// The verdicts of the replay go to `verdicts`.
+Result<ReplayOutcome> Compute(const RecordedSession& session, const Station& station, ReplayOptions options,
+                              std::vector<fsmsg::verdict_t>& verdicts, const Interrupt& interrupt) {
+  options.on_result = [&verdicts](const std::string& channel, ByteView message) {
+    if (auto verdict = Decode<fsmsg::verdict_t>(message); channel == kVerdict.name && verdict.ok()) {
+      verdicts.push_back(std::move(*verdict));
+    }
+  };
+  ProgressLine progress;
+  options.on_progress = [&progress](double share) { progress.Show(share); };
+  options.interrupted = [&interrupt] { return interrupt.Requested(); };
+  return Replay(session, station, options);
+}
+
+Status RunReplay(const ReplayArguments& arguments) {
+  spdlog::set_level(spdlog::level::off);  // what the services had to say is in the recording
+  ReplayOptions options;
+  ASSIGN_OR_RETURN(options.services, SelectServices(arguments.services));
+  RETURN_IF_ERROR(CheckArguments(arguments, options.services));
+  ASSIGN_OR_RETURN(const auto session, RecordedSession::Open(arguments.logs));
+  const Interrupt interrupt;  // before the folder and the services' threads are made
+  ASSIGN_OR_RETURN(const ScratchFolder scratch, ScratchFolder::Make());
+  ASSIGN_OR_RETURN(const Station station,
+                   UnpackStation(session, WithThreads(arguments.changes, arguments.threads), scratch.path()));
+  const bool changed = arguments.changes.Any(), what_if = changed || !arguments.report.empty();
+  options.chained = what_if;
+  ASSIGN_OR_RETURN(const auto changes, DescribeChanges(session, station));
+  PrintSome("changed", changes);
+  PrintSome("recording", session.findings());
+  const bool gives_verdicts = GivesVerdicts(options.services);
+  std::vector<fsmsg::verdict_t> verdicts;
+  const auto started = std::chrono::steady_clock::now();
+  ASSIGN_OR_RETURN(const auto outcome, Compute(session, station, std::move(options), verdicts, interrupt));
+  PrintOutcome(session, outcome,
+               std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count());
+  RETURN_IF_ERROR(KeepResults(station.results, arguments.results));
+  if (what_if && gives_verdicts) {
+    std::vector<std::string> remarks = session.findings();
+    remarks.insert(remarks.end(), outcome.changed_inputs.begin(), outcome.changed_inputs.end());
+    RETURN_IF_ERROR(WriteWhatIf(session, arguments,
+                                {session.opened().station, arguments.logs, changes, remarks}, verdicts));
+  } else if (what_if) {
+    fmt::print("no verdicts are computed: that needs the service report\n");
   }
-  return Judge(session, outcome);
+  return changed ? JudgeRecording(session, outcome) : Judge(session, outcome);
 }
 
 }  // namespace

@@ -1,12 +1,12 @@
 #include "tools/forgescan/replay/replay_run.h"
 
+#include <algorithm>
 #include <map>
 #include <memory>
 
 #include "services/common/bus/channel_list.h"
 #include "services/common/bus/channels.h"
 #include "services/common/bus/stream_header.h"
-#include "tools/forgescan/replay/message_text.h"
 #include "tools/forgescan/replay/recorded_lives.h"
 #include "tools/forgescan/replay/replay_network.h"
 
@@ -63,6 +63,12 @@ class Run {
       network->Finish();
     }
     outcome_.comparison.Finish();
+    for (const std::string& changed : outcome_.comparison.changed_records()) {
+      auto& all = outcome_.changed_inputs;
+      if (std::find(all.begin(), all.end(), changed) == all.end()) {  // one service's result, another's input
+        all.push_back(changed);
+      }
+    }
     return problem_;
   }
 
@@ -105,9 +111,7 @@ class Run {
     if (!IsStateChannel(channel)) {
       const Result<StreamHeader> header = CheckStreamHeader(message);
       if (!header.ok()) {  // the services would not take it either
-        outcome_.changed_inputs.push_back(
-            fmt::format("{}: {} is not as it was sent: {}", session_.Where(event),
-                        MessageTitle(session_.types(), channel, message), header.error().message));
+        outcome_.changed_inputs.push_back(NotAsSent(session_, event, message, header.error()));
         return {};
       }
       lost_before = LostBefore(channel, *header);
@@ -157,6 +161,9 @@ Result<ReplayOutcome> Replay(const RecordedSession& session, const Station& stat
   Run run(session, options, outcome);
   RETURN_IF_ERROR(run.Start(station));
   for (std::size_t i = 0; i < session.events().size(); ++i) {
+    if (options.interrupted()) {
+      return Fail(ErrorCode::kUnavailable, "interrupted");
+    }
     RETURN_IF_ERROR(run.Step(i));
     options.on_progress(static_cast<double>(i + 1) / static_cast<double>(session.events().size()));
   }

@@ -18,6 +18,8 @@ struct ReplayOptions {
   bool chained = false;
   // Called now and then with the share that is done, 0..1.
   std::function<void(double)> on_progress = [](double) {};
+  // Asked before every message; true ends the replay.
+  std::function<bool()> interrupted = [] { return false; };
   // Every result of the services, in the order of the replay.
   std::function<void(const std::string& channel, ByteView message)> on_result = [](const std::string&,
                                                                                    ByteView) {};
@@ -25,10 +27,11 @@ struct ReplayOptions {
 
 struct ReplayOutcome {
   ResultComparison comparison;
-  std::vector<std::string> changed_inputs;  // messages that are not as they were sent, one sentence each
+  // Recorded messages, inputs and results, that are not as they were sent, one sentence each.
+  std::vector<std::string> changed_inputs;
 };
 
-// Errors: those of the services' start, kIo (a recording cannot be read).
+// Errors: those of the services' start, kIo (a recording cannot be read), kUnavailable (interrupted).
 Result<ReplayOutcome> Replay(const RecordedSession& session, const Station& station,
                              const ReplayOptions& options);
 

@@ -3,8 +3,15 @@
 #include <algorithm>
 
 #include "services/common/bus/stream_header.h"
+#include "tools/forgescan/replay/message_text.h"
 
 namespace forgescan {
+
+std::string NotAsSent(const RecordedSession& session, const RecordedEvent& event, ByteView message,
+                      const Error& error) {
+  return fmt::format("{}: {} is not as it was sent: {}", session.Where(event),
+                     MessageTitle(session.types(), session.ChannelOf(event), message), error.message);
+}
 
 Result<ResultComparison> ResultComparison::Create(const RecordedSession& session,
                                                   const std::vector<std::string>& channels) {
@@ -20,7 +27,9 @@ Result<ResultComparison> ResultComparison::Create(const RecordedSession& session
     ASSIGN_OR_RETURN(const Bytes start, session.ReadStart(event, kStreamHeaderBytes));
     const auto utime = StreamUtime(start);
     if (!utime.ok()) {
-      return Fail(ErrorCode::kFormat, "{}: {}", session.Where(event), utime.error().message);
+      comparison.changed_records_.push_back(NotAsSent(session, event, start, utime.error()));
+      ++comparison.channels_[channel].missing;  // there was a result
+      continue;
     }
     comparison.recorded_[{channel, *utime}].push_back(event);
   }
@@ -46,7 +55,9 @@ Status ResultComparison::Compare(const RecordedEvent& event, const std::string& 
   ASSIGN_OR_RETURN(Bytes recorded, session_->Read(event));
   const Result<StreamHeader> header = CheckStreamHeader(recorded);
   if (!header.ok()) {
-    return Fail(ErrorCode::kFormat, "{}: {}", session_->Where(event), header.error().message);
+    changed_records_.push_back(NotAsSent(*session_, event, recorded, header.error()));
+    ++channels_[channel].differing;
+    return {};
   }
   Bytes numbered(replayed.begin(), replayed.end());
   RETURN_IF_ERROR(StampStreamHeader(numbered, *header));
@@ -69,15 +80,20 @@ void ResultComparison::Finish() {
   }
 }
 
-bool ResultComparison::Same() const {
-  std::int64_t equal = 0;
+ChannelComparison ResultComparison::Total() const {
+  ChannelComparison total;
   for (const auto& [channel, counts] : channels_) {
-    if (!counts.Same()) {
-      return false;
-    }
-    equal += counts.equal;
+    total.equal += counts.equal;
+    total.differing += counts.differing;
+    total.missing += counts.missing;
+    total.extra += counts.extra;
   }
-  return equal > 0;
+  return total;
+}
+
+bool ResultComparison::Same() const {
+  const ChannelComparison total = Total();
+  return total.Same() && total.equal > 0;
 }
 
 }  // namespace forgescan

@@ -31,6 +31,10 @@ struct FirstDifference {
   Bytes replayed;
 };
 
+// "FILE, event 12 at byte 345: VERDICT part 2 is not as it was sent: the checksum does not match"
+std::string NotAsSent(const RecordedSession& session, const RecordedEvent& event, ByteView message,
+                      const Error& error);
+
 class ResultComparison {
  public:
   // `session` outlives the comparison. Errors: kIo.
@@ -38,15 +42,20 @@ class ResultComparison {
                                          const std::vector<std::string>& channels);
 
   // A message sent in the replay. Messages belong together by channel and utime, several with one utime in
-  // their order. Errors: kIo (the record cannot be read), kFormat (the recorded message was changed).
+  // their order. A recorded message that is not as it was sent is a difference. Errors: kIo (the record
+  // cannot be read), kFormat (`replayed` is no stream's message).
   Status Add(const std::string& channel, ByteView replayed);
   // After the last message: what has not come is missing.
   void Finish();
 
   const std::map<std::string, ChannelComparison>& channels() const { return channels_; }
+  // Recorded messages that are not as they were sent, one sentence each.
+  const std::vector<std::string>& changed_records() const { return changed_records_; }
   const std::optional<FirstDifference>& first_difference() const { return first_difference_; }
   // No difference, and something was compared.
   bool Same() const;
+  // Sums over all channels.
+  ChannelComparison Total() const;
 
  private:
   using Moment = std::pair<std::string, std::int64_t>;  // channel, utime of the message
@@ -57,6 +66,7 @@ class ResultComparison {
   std::map<Moment, std::vector<RecordedEvent>> recorded_;
   std::map<Moment, std::size_t> replayed_;  // how many have come
   std::map<std::string, ChannelComparison> channels_;
+  std::vector<std::string> changed_records_;
   std::optional<FirstDifference> first_difference_;
 };
 

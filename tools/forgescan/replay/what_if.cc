@@ -7,6 +7,7 @@
 
 #include "services/common/bus/channels.h"
 #include "services/common/bus/codec.h"
+#include "services/common/bus/stream_header.h"
 
 namespace forgescan {
 namespace {
@@ -57,7 +58,10 @@ Result<std::vector<fsmsg::verdict_t>> RecordedVerdicts(const RecordedSession& se
   for (const RecordedEvent& event : session.events()) {
     if (session.ChannelOf(event) == kVerdict.name) {
       ASSIGN_OR_RETURN(const Bytes message, session.Read(event));
-      ASSIGN_OR_RETURN(verdicts.emplace_back(), Decode<fsmsg::verdict_t>(message));
+      auto verdict = Decode<fsmsg::verdict_t>(message);
+      if (verdict.ok() && CheckStreamHeader(message).ok()) {
+        verdicts.push_back(std::move(*verdict));
+      }
     }
   }
   return verdicts;

@@ -30,7 +30,7 @@ struct PartChange {
   bool Flipped() const { return recorded_verdict != now_verdict; }
 };
 
-// The recorded verdicts. Errors: kIo, kFormat.
+// The recorded verdicts that are as they were sent. Errors: kIo.
 Result<std::vector<fsmsg::verdict_t>> RecordedVerdicts(const RecordedSession& session);
 
 // Parts in order of time; a part belongs together by number and utime. Dimensions in the features' order.
@@ -44,6 +44,7 @@ struct WhatIfPage {
   std::string station;
   std::vector<std::string> recordings;
   std::vector<std::string> changes;  // of the settings, one line each
+  std::vector<std::string> remarks;  // what is wrong with the recordings, one sentence each
 };
 // A page that needs nothing else.
 std::string WhatIfHtml(const WhatIfPage& page, const std::vector<PartChange>& parts);

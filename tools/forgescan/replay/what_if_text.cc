@@ -5,21 +5,22 @@
 
 #include "services/report/report_style.h"
 #include "services/report/report_text.h"
+#include "services/report/verdict_rule.h"
 #include "tools/forgescan/replay/what_if.h"
 
 namespace forgescan {
 namespace {
 
-constexpr const char* kNames[] = {"none", "OK", "NOT_OK", "NOT_DECIDABLE", "NOT_INSPECTED"};
 constexpr const char* kClasses[] = {"not-inspected", "ok", "not-ok", "not-decidable", "not-inspected"};
 
-std::size_t IndexOf(std::int8_t verdict) {
-  return verdict >= 0 && verdict < 5 ? static_cast<std::size_t>(verdict) : 0;
+std::string_view NameOf(std::int8_t number) {
+  const Verdict verdict = VerdictFromNumber(number);
+  return verdict == Verdict::kUnknown ? "none" : VerdictText(verdict);
 }
-const char* NameOf(std::int8_t verdict) { return kNames[IndexOf(verdict)]; }
 
 std::string Chip(std::int8_t verdict) {
-  return fmt::format("<span class=\"chip {}\">{}</span>", kClasses[IndexOf(verdict)], NameOf(verdict));
+  return fmt::format("<span class=\"chip {}\">{}</span>",
+                     kClasses[static_cast<std::size_t>(VerdictFromNumber(verdict))], NameOf(verdict));
 }
 
 std::string ChipPair(std::int8_t recorded, std::int8_t now) {
@@ -139,6 +140,9 @@ std::string WhatIfHtml(const WhatIfPage& page, const std::vector<PartChange>& pa
           "<div class=\"sub\">Station {}</div></div></header>\n",
           flips, EscapeHtml(page.station)) +
       Section("Changed settings", page.changes.empty() ? "<p class=\"none\">None.</p>" : List(page.changes)) +
+      (page.remarks.empty()
+           ? std::string()
+           : Section("The recordings are not whole, or not as they were made", List(page.remarks))) +
       Section("Parts", "<table>" + rows + "</table>") + Section("Recordings", List(page.recordings));
   return fmt::format(
       "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" "

@@ -85,6 +85,25 @@ TEST_F(ResultComparisonTest, CountsWhatIsMissingAndWhatIsMore) {
   EXPECT_FALSE(comparison_->Same());
 }
 
+TEST(ResultComparison, ARecordedResultThatWasChangedIsADifferenceAndNamed) {
+  const TestFolder folder;
+  fsmsg::verdict_t verdict{};
+  verdict.utime = kSession + 10;
+  WrittenRecording recording(folder / "one.lcmlog");
+  Bytes bytes = recording.Stream(kVerdict, verdict, 1);
+  recording.CloseAfter([](auto& events) { events[1].message.back() ^= 1; });
+  const auto session = RecordedSession::Open({folder / "one.lcmlog"});
+  ASSERT_TRUE(session.ok()) << session.error().message;
+  auto comparison = ResultComparison::Create(*session, {"VERDICT"});
+  ASSERT_TRUE(comparison.ok());
+  const Status added = comparison->Add("VERDICT", bytes);
+  ASSERT_TRUE(added.ok()) << added.error().message;
+  comparison->Finish();
+  EXPECT_EQ(comparison->Total().differing, 1);
+  ASSERT_EQ(comparison->changed_records().size(), 1u);
+  EXPECT_NE(comparison->changed_records()[0].find("VERDICT"), std::string::npos);
+}
+
 TEST_F(ResultComparisonTest, NothingComparedIsNotTheSame) {
   auto nothing = ResultComparison::Create(*session_, {"REGISTRATION"});
   ASSERT_TRUE(nothing.ok());

@@ -73,8 +73,9 @@ TEST(WhatIf, AVerdictSaidAgainIsOneVerdict) {
 
 TEST(WhatIf, ThePageShowsEveryPartAndEscapesWhatItIsTold) {
   const auto parts = CompareVerdicts({Verdict(1, kOk, 10)}, {Verdict(1, kNotOk, 11.25)});
-  const std::string page = WhatIfHtml({"<east>", {"a&b.lcmlog"}, {"fusion.x = 1"}}, parts);
-  for (const char* text : {"&lt;east&gt;", "a&amp;b.lcmlog", "fusion.x = 1", "11.250",
+  const std::string page =
+      WhatIfHtml({"<east>", {"a&b.lcmlog"}, {"fusion.x = 1"}, {"an end is missing"}}, parts);
+  for (const char* text : {"&lt;east&gt;", "an end is missing", "a&amp;b.lcmlog", "fusion.x = 1", "11.250",
                            "length &lt;too&gt; large", "1 of 1 verdicts change"}) {
     EXPECT_THAT(page, HasSubstr(text));
   }
