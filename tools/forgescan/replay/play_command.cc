@@ -3,10 +3,11 @@
 
 #include "services/common/bus/channel_list.h"
 #include "services/common/bus/lcm_bus.h"
+#include "services/common/bus/stream_header.h"
 #include "services/common/bus/stream_hub.h"
 #include "tools/finite_range.h"
 #include "tools/forgescan/command.h"
-#include "tools/forgescan/replay/recorded_session.h"
+#include "tools/forgescan/replay/result_comparison.h"
 #include "tools/forgescan/station/interrupt.h"
 
 namespace forgescan {
@@ -51,6 +52,8 @@ class Player {
   }
 
   std::int64_t sent() const { return sent_; }
+  // Messages that are not as they were sent, one sentence each.
+  const std::vector<std::string>& left_out() const { return left_out_; }
   std::int64_t resent() const { return hub_.counters().resent; }
 
  private:
@@ -67,6 +70,10 @@ class Player {
       return {};
     }
     ASSIGN_OR_RETURN(Bytes message, session_.Read(event));
+    if (const auto header = CheckStreamHeader(message); !IsStateChannel(channel) && !header.ok()) {
+      left_out_.push_back(NotAsSent(session_, event, message, header.error()));  // its checksum is made anew
+      return {};
+    }
     ++sent_;
     return IsStateChannel(channel) ? bus_.Publish(channel, message)
                                    : hub_.PublishBytes(channel, std::move(message));
@@ -94,18 +101,40 @@ class Player {
   StreamHub hub_;
   const Interrupt interrupt_;
   std::int64_t sent_ = 0;
+  std::vector<std::string> left_out_;
 };
+
+Status CheckChannels(const RecordedSession& session, const std::vector<std::string>& channels) {
+  for (const std::string& channel : channels) {
+    if (std::none_of(session.events().begin(), session.events().end(),
+                     [&](const auto& event) { return session.ChannelOf(event) == channel; })) {
+      return Fail(ErrorCode::kInvalidArgument, "--channel {}: the recording holds no message of it", channel);
+    }
+  }
+  return {};
+}
 
 Status RunPlay(const PlayArguments& arguments) {
   ASSIGN_OR_RETURN(const auto session, RecordedSession::Open(arguments.logs));
+  RETURN_IF_ERROR(CheckChannels(session, arguments.channels));
   ASSIGN_OR_RETURN(const auto bus, LcmBus::Open(arguments.bus_url));
   for (const std::string& finding : session.findings()) {
     fmt::print("recording: {}\n", finding);
   }
   Player player(session, *bus, arguments);
   ASSIGN_OR_RETURN(const bool finished, player.Run());
+  for (const std::string& message : player.left_out()) {
+    fmt::print("left out: {}\n", message);
+  }
   fmt::print("{} messages played, {} sent again on request\n", player.sent(), player.resent());
-  return finished ? Status() : Fail(ErrorCode::kUnavailable, "interrupted");
+  if (!finished) {
+    return Fail(ErrorCode::kUnavailable, "interrupted");
+  }
+  if (!player.left_out().empty()) {
+    return Fail(ErrorCode::kUntrusted, "{} recorded messages are not as they were sent, and were left out",
+                player.left_out().size());
+  }
+  return player.sent() > 0 ? Status() : Fail(ErrorCode::kInvalidArgument, "there is nothing to play");
 }
 
 }  // namespace
