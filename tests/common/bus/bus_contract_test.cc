@@ -179,8 +179,8 @@ TEST(SimBus, WhatItsFilterRefusesReachesNobody) {
   std::vector<Bytes> heard;
   receiver.Subscribe("X", [&heard](ByteView message) { heard.emplace_back(message.begin(), message.end()); });
   sender.SetSendFilter([](std::string_view, ByteView message) { return message[0] != 2; });
-  for (const std::uint8_t byte : {1, 2, 3}) {
-    ASSERT_TRUE(sender.Publish("X", Bytes{byte}).ok());
+  for (const Bytes& message : {Bytes{1}, Bytes{2}, Bytes{3}}) {
+    ASSERT_TRUE(sender.Publish("X", message).ok());
   }
   network.RunFor(10'000);
   EXPECT_EQ(heard, (std::vector<Bytes>{{1}, {3}}));
