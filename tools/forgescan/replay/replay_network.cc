@@ -1,6 +1,5 @@
 #include "tools/forgescan/replay/replay_network.h"
 
-#include <algorithm>
 #include <filesystem>
 
 #include "services/common/bus/channel_list.h"
@@ -46,15 +45,13 @@ class KeptFolder {
 
 }  // namespace
 
-// A service with its place on the network. Members end in reverse order.
+// The service with its place on the network. Members end in reverse order.
 struct ReplayNetwork::Host {
-  Host(SimNetwork& network, const ReplayableService& which, const std::string& config_hash)
-      : known(which), bus(network.AddNode()), hub(bus, which.name), monitor(hub, which.name, config_hash) {}
+  Host(SimNetwork& network, const std::string& name, const std::string& config_hash)
+      : bus(network.AddNode()), hub(bus, name), monitor(hub, name, config_hash) {}
 
   // Refuses what the killed service did not come to say, and all that follows it.
-  void LiveAs(const RecordedLife& life) {
-    std::set<std::string, std::less<>> streams(known.results.begin(), known.results.end());
-    streams.insert(known.durations.begin(), known.durations.end());
+  void LiveAs(const RecordedLife& life, const std::set<std::string, std::less<>>& streams) {
     bus.SetSendFilter(
         [this, streams, last_utime = life.last_utime](std::string_view channel, ByteView message) {
           if (const auto utime = StreamUtime(message); streams.contains(channel) && utime.ok()) {
@@ -68,7 +65,6 @@ struct ReplayNetwork::Host {
     bus.SetSendFilter([](std::string_view, ByteView) { return false; });
   }
 
-  const ReplayableService& known;
   bool dying = false;   // in the record it may be dead by now
   bool killed = false;  // it was dead when it would have said what it says here
   SimBus& bus;
@@ -77,79 +73,65 @@ struct ReplayNetwork::Host {
   std::shared_ptr<void> service;
 };
 
-ReplayNetwork::ReplayNetwork(const Station& station, std::vector<ReplayableService> services,
-                             std::int64_t start_us, ResultHandler on_result)
+ReplayNetwork::ReplayNetwork(const Station& station, ReplayableService service, std::int64_t start_us,
+                             ResultHandler on_result)
     : network_(1, start_us),
       recording_(network_.AddNode()),
       station_(station),
-      on_result_(std::move(on_result)),
-      services_(std::move(services)),
+      service_(std::move(service)),
       session_(start_us) {
   network_.SetFaults({.latency_us = 0});
-  for (const ReplayableService& service : services_) {
-    own_channels_.insert(service.results.begin(), service.results.end());
-    own_channels_.insert(service.durations.begin(), service.durations.end());
-    for (const std::string channel : service.results) {
-      recording_.Subscribe(channel, [this, channel](ByteView message) { on_result_(channel, message); });
-    }
+  own_.insert(service_.results.begin(), service_.results.end());
+  own_.insert(service_.durations.begin(), service_.durations.end());
+  for (const std::string channel : service_.results) {
+    recording_.Subscribe(channel, [on_result, channel](ByteView message) { on_result(channel, message); });
   }
 }
 
 ReplayNetwork::~ReplayNetwork() = default;
 
-const ReplayableService& ReplayNetwork::Known(const std::string& name) const {
-  return *std::find_if(services_.begin(), services_.end(),
-                       [&name](const auto& known) { return known.name == name; });
-}
-
-Status ReplayNetwork::Begin(const std::string& name, const RecordedLife& life, std::int64_t utime) {
+Status ReplayNetwork::Begin(const RecordedLife& life, std::int64_t utime) {
   network_.RunUntil(utime);
-  auto host = std::make_unique<Host>(network_, Known(name), station_.file.hash());
+  auto host = std::make_unique<Host>(network_, service_.name, station_.file.hash());
   if (life.how == RecordedLife::End::kKilled) {
-    host->LiveAs(life);
+    host->LiveAs(life, own_);
   }
-  ASSIGN_OR_RETURN(host->service, host->known.make({station_, host->hub, host->monitor}));
-  hosts_[name] = std::move(host);
+  ASSIGN_OR_RETURN(host->service, service_.make({station_, host->hub, host->monitor}));
+  host_ = std::move(host);
   return {};
 }
 
-void ReplayNetwork::NoteLastWord(const std::string& name) {
-  if (const auto host = hosts_.find(name); host != hosts_.end()) {
-    host->second->dying = true;
+void ReplayNetwork::NoteLastWord() {
+  if (host_ != nullptr) {
+    host_->dying = true;
   }
 }
 
-Status ReplayNetwork::End(const std::string& name, RecordedLife::End how, std::int64_t utime) {
+Status ReplayNetwork::End(RecordedLife::End how, std::int64_t utime) {
   network_.RunUntil(utime);
-  const auto host = hosts_.find(name);
-  if (host == hosts_.end()) {
+  if (host_ == nullptr) {
     return {};
   }
   if (how == RecordedLife::End::kStopped) {
-    Remove(name);
+    Remove();
     return {};
   }
-  host->second->Silence();
-  if (!host->second->known.keeps_files) {
-    Remove(name);
+  host_->Silence();
+  if (!service_.keeps_files) {
+    Remove();
     return {};
   }
   // Here it has an end; what it writes then, a killed process did not.
   ASSIGN_OR_RETURN(const KeptFolder kept, KeptFolder::Keep(station_.results));
-  Remove(name);
+  Remove();
   return kept.PutBack();
 }
 
-void ReplayNetwork::Remove(const std::string& name) {
-  const auto found = hosts_.find(name);
-  SimBus& bus = found->second->bus;
-  hosts_.erase(found);
+void ReplayNetwork::Remove() {
+  SimBus& bus = host_->bus;
+  host_.reset();
   network_.RemoveNode(bus);
   network_.RunFor(0);  // what it said last
-}
-
-bool ReplayNetwork::Needs(std::string_view channel) const {
-  return network_.IsHeard(channel) && !own_channels_.contains(channel);
 }
 
 Status ReplayNetwork::Feed(std::int64_t utime, const std::string& channel, Bytes message,
@@ -157,8 +139,7 @@ Status ReplayNetwork::Feed(std::int64_t utime, const std::string& channel, Bytes
   network_.RunUntil(utime);
   if (channel == kServiceState.name) {
     const auto state = Decode<fsmsg::service_state_t>(message);
-    const auto is_own = [&state](const auto& service) { return service.name == state->name; };
-    if (state.ok() && std::any_of(services_.begin(), services_.end(), is_own)) {
+    if (state.ok() && state->name == service_.name) {
       return {};  // here it speaks for itself
     }
   }
@@ -167,16 +148,15 @@ Status ReplayNetwork::Feed(std::int64_t utime, const std::string& channel, Bytes
     sequence += 1 + lost_before;
     RETURN_IF_ERROR(StampStreamHeader(message, {session_, sequence}));
   }
-  Host* dying = DyingWithFiles();
-  if (dying == nullptr) {
+  if (host_ == nullptr || !host_->dying || !service_.keeps_files) {
     return Deliver(utime, channel, message);
   }
   ASSIGN_OR_RETURN(const KeptFolder kept, KeptFolder::Keep(station_.results));
   RETURN_IF_ERROR(Deliver(utime, channel, message));
-  if (!dying->killed) {
+  if (!host_->killed) {
     return {};
   }
-  Remove(dying->known.name);
+  Remove();
   return kept.PutBack();
 }
 
@@ -186,17 +166,10 @@ Status ReplayNetwork::Deliver(std::int64_t utime, const std::string& channel, By
   return {};
 }
 
-ReplayNetwork::Host* ReplayNetwork::DyingWithFiles() {
-  const auto host = std::find_if(hosts_.begin(), hosts_.end(), [](const auto& held) {
-    return held.second->dying && held.second->known.keeps_files;
-  });
-  return host == hosts_.end() ? nullptr : host->second.get();
-}
-
 void ReplayNetwork::Finish() {
-  while (!hosts_.empty()) {
-    hosts_.begin()->second->Silence();
-    Remove(hosts_.begin()->first);
+  if (host_ != nullptr) {
+    host_->Silence();
+    Remove();
   }
 }
 

@@ -7,6 +7,7 @@
 #include "services/common/bus/channel_list.h"
 #include "services/common/bus/channels.h"
 #include "services/common/bus/stream_header.h"
+#include "tools/forgescan/replay/chained_results.h"
 #include "tools/forgescan/replay/recorded_lives.h"
 #include "tools/forgescan/replay/replay_network.h"
 
@@ -16,25 +17,17 @@ namespace {
 class Run {
  public:
   Run(const RecordedSession& session, const ReplayOptions& options, ReplayOutcome& outcome)
-      : session_(session), options_(options), outcome_(outcome) {}
+      : session_(session), options_(options), outcome_(outcome), chain_(outcome.comparison) {}
 
   Status Start(const Station& station) {
     const std::int64_t start_us = session_.events().front().utime;
-    const auto on_result = [this](const std::string& channel, ByteView message) {
-      options_.on_result(channel, message);
-      Keep(outcome_.comparison.Add(channel, message));
-    };
-    const auto add = [&](std::vector<ReplayableService> services) {
-      networks_.push_back(std::make_unique<ReplayNetwork>(station, std::move(services), start_us, on_result));
-      return networks_.back().get();
-    };
-    ReplayNetwork* all = options_.chained ? add(options_.services) : nullptr;
     ASSIGN_OR_RETURN(const auto lives, LivesOf(session_, options_.services));
     for (std::size_t i = 0; i < lives.size(); ++i) {
-      const ReplayableService& service = options_.services[i];
-      ReplayNetwork& network = all != nullptr ? *all : *add({service});
+      networks_.push_back(std::make_unique<ReplayNetwork>(
+          station, options_.services[i], start_us,
+          [this](const std::string& channel, ByteView message) { OnResult(channel, message); }));
       for (const RecordedLife& life : lives[i]) {
-        RETURN_IF_ERROR(Plan(network, service.name, life, start_us));
+        RETURN_IF_ERROR(Plan(*networks_.back(), life, start_us));
       }
     }
     return {};
@@ -44,17 +37,17 @@ class Run {
   Status Step(std::size_t index) {
     const RecordedEvent& event = session_.events()[index];
     for (auto [begin, end] = begins_.equal_range(index); begin != end; ++begin) {
-      const auto& [network, name, life] = begin->second;
-      RETURN_IF_ERROR(network->Begin(name, life, event.utime));
+      RETURN_IF_ERROR(begin->second.network->Begin(begin->second.life, event.utime));
     }
-    RETURN_IF_ERROR(Feed(event));
+    RETURN_IF_ERROR(options_.chained && chain_.Holds(session_.ChannelOf(event)) ? Pass(event) : Feed(event));
+    RETURN_IF_ERROR(FeedWhatIsDue(event.utime));
     for (auto [begin, end] = last_words_.equal_range(index); begin != end; ++begin) {
-      begin->second.network->NoteLastWord(begin->second.service);
+      begin->second.network->NoteLastWord();
     }
     for (auto [begin, end] = ends_.equal_range(index); begin != end; ++begin) {
-      const auto& [network, name, life] = begin->second;
-      RETURN_IF_ERROR(network->End(name, life.how, event.utime));
+      RETURN_IF_ERROR(begin->second.network->End(begin->second.life.how, event.utime));
     }
+    RETURN_IF_ERROR(FeedWhatIsDue(event.utime));
     return std::exchange(problem_, Status());
   }
 
@@ -75,34 +68,66 @@ class Run {
  private:
   struct Planned {
     ReplayNetwork* network;
-    std::string service;
     RecordedLife life;
   };
 
-  Status Plan(ReplayNetwork& network, const std::string& service, const RecordedLife& life,
-              std::int64_t start_us) {
+  void OnResult(const std::string& channel, ByteView message) {
+    options_.on_result(channel, message);
+    Keep(outcome_.comparison.Add(channel, message));
+    if (options_.chained) {
+      Keep(chain_.Add(channel, message));
+    }
+  }
+
+  Status Plan(ReplayNetwork& network, const RecordedLife& life, std::int64_t start_us) {
     if (!life.listened) {
       return {};
     }
     if (life.how != RecordedLife::End::kRunsOn) {
-      last_words_.emplace(life.last_word, Planned{&network, service, life});
-      ends_.emplace(life.end, Planned{&network, service, life});
+      last_words_.emplace(life.last_word, Planned{&network, life});
+      ends_.emplace(life.end, Planned{&network, life});
     }
     if (life.begin.has_value()) {
-      begins_.emplace(*life.begin, Planned{&network, service, life});
+      begins_.emplace(*life.begin, Planned{&network, life});
       return {};
     }
-    return network.Begin(service, life, start_us);
+    return network.Begin(life, start_us);
   }
 
-  Status Feed(const RecordedEvent& event) {
-    const std::string& channel = session_.ChannelOf(event);
+  std::vector<ReplayNetwork*> ReceiversOf(const std::string& channel) const {
     std::vector<ReplayNetwork*> receivers;
     for (const auto& network : networks_) {
       if (network->Needs(channel) || channel == kServiceState.name) {
         receivers.push_back(network.get());
       }
     }
+    return receivers;
+  }
+
+  // The place of a recorded result, which the replay's own takes.
+  Status Pass(const RecordedEvent& event) {
+    for (const auto& network : networks_) {
+      network->RunUntil(event.utime);  // it may be given by a timeout
+    }
+    ASSIGN_OR_RETURN(const Bytes start, session_.ReadStart(event, kStreamHeaderBytes));
+    if (const auto utime = StreamUtime(start); utime.ok()) {
+      chain_.Pass(session_.ChannelOf(event), *utime);
+    }
+    return {};
+  }
+
+  Status FeedWhatIsDue(std::int64_t utime) {
+    while (const auto due = chain_.Take()) {
+      for (ReplayNetwork* network : ReceiversOf(due->first)) {
+        RETURN_IF_ERROR(network->Feed(utime, due->first, due->second, 0));
+      }
+    }
+    return {};
+  }
+
+  Status Feed(const RecordedEvent& event) {
+    const std::string& channel = session_.ChannelOf(event);
+    const std::vector<ReplayNetwork*> receivers = ReceiversOf(channel);
     if (receivers.empty()) {
       return {};
     }
@@ -139,6 +164,7 @@ class Run {
   const RecordedSession& session_;
   const ReplayOptions& options_;
   ReplayOutcome& outcome_;
+  ChainedResults chain_;
   std::vector<std::unique_ptr<ReplayNetwork>> networks_;
   std::multimap<std::size_t, Planned> begins_, last_words_, ends_;  // by the event
   std::map<std::string, StreamHeader> last_;                        // fed, by channel

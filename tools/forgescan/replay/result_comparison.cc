@@ -80,6 +80,11 @@ void ResultComparison::Finish() {
   }
 }
 
+std::size_t ResultComparison::RecordedCount(const std::string& channel, std::int64_t utime) const {
+  const auto recorded = recorded_.find({channel, utime});
+  return recorded == recorded_.end() ? 0 : recorded->second.size();
+}
+
 ChannelComparison ResultComparison::Total() const {
   ChannelComparison total;
   for (const auto& [channel, counts] : channels_) {

@@ -48,6 +48,8 @@ class ResultComparison {
   // After the last message: what has not come is missing.
   void Finish();
 
+  // How many messages on the channel are recorded of the event that was then.
+  std::size_t RecordedCount(const std::string& channel, std::int64_t utime) const;
   const std::map<std::string, ChannelComparison>& channels() const { return channels_; }
   // Recorded messages that are not as they were sent, one sentence each.
   const std::vector<std::string>& changed_records() const { return changed_records_; }
