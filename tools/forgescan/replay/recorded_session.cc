@@ -120,7 +120,7 @@ std::int64_t RecordedSession::LostBetween(const std::string& channel, const Stre
   return lost;
 }
 
-Status RecordedSession::Add(Recording recording) {
+Status RecordedSession::Add(Recording&& recording) {
   const LogReader& log = recording.log;
   if (!recording.opened.has_value()) {
     return Fail(ErrorCode::kFormat,

@@ -13,9 +13,10 @@
 #include "services/common/log/lcm_type.h"
 #include "services/common/log/log_reader.h"
 #include "services/common/result.h"
-#include "tools/forgescan/log/recording.h"
 
 namespace forgescan {
+
+struct Recording;
 
 struct RecordedEvent {
   std::size_t log = 0;     // which recording
@@ -54,7 +55,7 @@ class RecordedSession {
   std::int64_t duration_us() const;
 
  private:
-  Status Add(Recording recording);
+  Status Add(Recording&& recording);
   Status AddAddition(const LogReader& log, const LogEntry& entry);
   Status AddFile(const LogReader& log, fsmsg::recorded_file_t file);
   Status Merge();
