@@ -4,13 +4,12 @@
 
 #include <algorithm>
 #include <array>
-#include <fstream>
-#include <iterator>
 #include <sstream>
 #define TOML_EXCEPTIONS 0
 #define TOML_HEADER_ONLY 1
 #include <toml++/toml.h>
 
+#include "services/common/input_file.h"
 #include "services/common/output_file.h"
 
 namespace forgescan {
@@ -30,15 +29,6 @@ constexpr Role kRoles[] = {{"calibration", &Station::calibration, {"reconstructi
                            {"views", &Station::views, {"fusion"}},
                            {"model", &Station::model, {"registration", "report"}},
                            {"features", &Station::features, {"report"}}};
-
-Result<std::string> ReadText(const fs::path& path) {
-  std::ifstream stream(path, std::ios::binary);
-  std::string text{std::istreambuf_iterator<char>(stream), {}};
-  if (!stream.is_open() || stream.bad()) {
-    return Fail(ErrorCode::kNotFound, "{} cannot be read", path.string());
-  }
-  return text;
-}
 
 Result<toml::table> ParseToml(std::string_view text, const std::string& name) {
   toml::parse_result parsed = toml::parse(text);
@@ -128,7 +118,7 @@ Result<std::string> ConfigText(const RecordedSession& session, const StationChan
   if (changes.config.empty()) {
     text = TextOf(*recorded);
   } else {
-    ASSIGN_OR_RETURN(text, ReadText(changes.config));
+    ASSIGN_OR_RETURN(text, ReadInputFile(changes.config));
   }
   if (changes.values.empty()) {
     return text;
@@ -207,7 +197,7 @@ Result<std::vector<std::string>> DescribeChanges(const RecordedSession& session,
     ASSIGN_OR_RETURN(const toml::table table, ParseToml(TextOf(*recorded), kStationFile));
     Flatten(table, "", before);
   }
-  ASSIGN_OR_RETURN(const std::string text, ReadText(fs::path(station.folder) / kStationFile));
+  ASSIGN_OR_RETURN(const std::string text, ReadInputFile(fs::path(station.folder) / kStationFile));
   ASSIGN_OR_RETURN(const toml::table table, ParseToml(text, kStationFile));
   Flatten(table, "", now);
   for (const auto& [key, value] : now) {
@@ -224,7 +214,7 @@ Result<std::vector<std::string>> DescribeChanges(const RecordedSession& session,
   }
   for (const Role& role : kRoles) {
     const fsmsg::recorded_file_t* file = FindFile(session, role.name);
-    ASSIGN_OR_RETURN(const std::string used, ReadText(station.*role.path));
+    ASSIGN_OR_RETURN(const std::string used, ReadInputFile(station.*role.path));
     if (file == nullptr || TextOf(*file) != used) {
       lines.push_back(fmt::format("{} is another file: {}", role.name, station.*role.path));
     }

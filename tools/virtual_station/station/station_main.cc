@@ -7,11 +7,10 @@
 #include <csignal>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <regex>
-#include <sstream>
 
 #include "services/common/config/config.h"
+#include "services/common/input_file.h"
 #include "tools/finite_range.h"
 #include "tools/virtual_station/commissioning.h"
 #include "tools/virtual_station/station/live_cell.h"
@@ -33,16 +32,6 @@ struct Arguments {
   bool start = false;
 };
 
-Result<std::string> ReadText(const fs::path& path) {
-  std::ifstream stream(path, std::ios::binary);
-  std::stringstream text;
-  text << stream.rdbuf();
-  if (!stream.is_open() || !stream.good()) {
-    return Fail(ErrorCode::kNotFound, "{}: cannot be read", path.string());
-  }
-  return text.str();
-}
-
 // Copies the station and the cell into the run's folder and commissions the station: calibration, views,
 // model, and what station.toml says of cameras and steel.
 Status Prepare(const Arguments& arguments) {
@@ -50,8 +39,8 @@ Status Prepare(const Arguments& arguments) {
   std::error_code problem;
   fs::create_directories(run / "station", problem);
   fs::create_directories(run / "truth", problem);
-  ASSIGN_OR_RETURN(const std::string station_text, ReadText(station / "station.toml"));
-  ASSIGN_OR_RETURN(std::string cell_text, ReadText(station / arguments.cell));
+  ASSIGN_OR_RETURN(const std::string station_text, ReadInputFile(station / "station.toml"));
+  ASSIGN_OR_RETURN(std::string cell_text, ReadInputFile(station / arguments.cell));
   if (arguments.scale_divisor != 0) {
     cell_text = std::regex_replace(cell_text, std::regex("scale_divisor = \\d+"),
                                    fmt::format("scale_divisor = {}", arguments.scale_divisor));
