@@ -103,18 +103,21 @@ Status JudgeRecording(const RecordedSession& session, const ReplayOutcome& outco
 
 Status Judge(const RecordedSession& session, const ReplayOutcome& outcome) {
   const ChannelComparison total = outcome.comparison.Total();
-  if (outcome.changed_inputs.empty() && total.equal + total.differing + total.missing == 0) {
+  const bool as_sent = outcome.changed_inputs.empty(), whole = session.findings().empty();
+  if (as_sent && total.equal + total.differing + total.missing == 0) {
     return Fail(ErrorCode::kUntrusted,
                 "there is nothing to compare: the recording holds no result of these services");
   }
-  if (outcome.changed_inputs.empty() && !session.findings().empty() && total.differing + total.missing == 0) {
+  if (as_sent && !whole && total.differing + total.missing == 0) {
     return Fail(ErrorCode::kUntrusted,
                 "what there is replays equally, but the recording is not whole; {} results are not in it",
                 total.extra);
   }
-  RETURN_IF_ERROR(JudgeRecording(session, outcome));
-  return total.Same() ? Status()
-                      : Fail(ErrorCode::kUntrusted, "the replay's results are not those of the recording");
+  if (as_sent && !total.Same()) {
+    return Fail(ErrorCode::kUntrusted, "the replay's results are not those of the recording{}",
+                whole ? "" : ", which is not whole");
+  }
+  return JudgeRecording(session, outcome);
 }
 
 Status WriteWhatIf(const RecordedSession& session, const ReplayArguments& arguments, const WhatIfPage& page,
@@ -184,6 +187,7 @@ Status RunReplay(const ReplayArguments& arguments) {
   ASSIGN_OR_RETURN(options.services, SelectServices(arguments.services));
   RETURN_IF_ERROR(CheckArguments(arguments, options.services));
   ASSIGN_OR_RETURN(const auto session, RecordedSession::Open(arguments.logs));
+  PrintSome("recording", session.findings());
   const Interrupt interrupt;  // before the folder and the services' threads are made
   ASSIGN_OR_RETURN(const ScratchFolder scratch, ScratchFolder::Make());
   ASSIGN_OR_RETURN(const Station station,
@@ -192,7 +196,6 @@ Status RunReplay(const ReplayArguments& arguments) {
   options.chained = what_if;
   ASSIGN_OR_RETURN(const auto changes, DescribeChanges(session, station));
   PrintSome("changed", changes);
-  PrintSome("recording", session.findings());
   const bool gives_verdicts = GivesVerdicts(options.services);
   std::vector<fsmsg::verdict_t> verdicts;
   const auto started = std::chrono::steady_clock::now();
@@ -218,12 +221,15 @@ void AddReplayCommand(CLI::App& app, Status& outcome) {
   CLI::App* command =
       app.add_subcommand("replay", "compute a recorded session again and compare every result byte for byte");
   command->add_option("LOG", arguments.logs, "recordings of parts, in any order")->required();
-  command->add_option("--service", arguments.services,
-                      "only this one: reconstruction, fusion, registration or report; may be repeated");
+  command
+      ->add_option("--service", arguments.services,
+                   "only this one: reconstruction, fusion, registration or report; may be repeated")
+      ->allow_extra_args(false);
   command->add_option("--threads", arguments.threads, "for the computation; the results do not depend on it")
       ->check(CLI::Range(1, 64));
   command->add_option("--results", arguments.results, "keep the reports of the replay in this folder");
-  command->add_option("--set", arguments.changes.values, "what if: table.key=value of station.toml");
+  command->add_option("--set", arguments.changes.values, "what if: table.key=value of station.toml")
+      ->allow_extra_args(false);
   command->add_option("--config", arguments.changes.config, "what if: another station.toml")
       ->check(CLI::ExistingFile);
   for (const char* role : {"calibration", "pattern", "views", "model", "features"}) {
