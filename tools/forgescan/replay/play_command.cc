@@ -119,8 +119,10 @@ void AddPlayCommand(CLI::App& app, Status& outcome) {
   command->add_option("--speed", arguments.speed, "times as fast as it was recorded")
       ->check(FiniteRange(0.01, 100))
       ->capture_default_str();
-  command->add_option("--channel", arguments.channels, "only this channel; may be repeated");
-  command->add_option("--without", arguments.without, "not this channel; may be repeated");
+  command->add_option("--channel", arguments.channels, "only this channel; may be repeated")
+      ->allow_extra_args(false);
+  command->add_option("--without", arguments.without, "not this channel; may be repeated")
+      ->allow_extra_args(false);
   command->callback([&outcome] { outcome = RunPlay(arguments); });
 }
 

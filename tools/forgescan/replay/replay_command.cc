@@ -157,12 +157,15 @@ void AddReplayCommand(CLI::App& app, Status& outcome) {
   CLI::App* command =
       app.add_subcommand("replay", "compute a recorded session again and compare every result byte for byte");
   command->add_option("LOG", arguments.logs, "recordings of parts, in any order")->required();
-  command->add_option("--service", arguments.services,
-                      "only this one: reconstruction, fusion, registration or report; may be repeated");
+  command
+      ->add_option("--service", arguments.services,
+                   "only this one: reconstruction, fusion, registration or report; may be repeated")
+      ->allow_extra_args(false);
   command->add_option("--threads", arguments.threads, "for the computation; the results do not depend on it")
       ->check(CLI::Range(1, 64));
   command->add_option("--results", arguments.results, "keep the reports of the replay in this folder");
-  command->add_option("--set", arguments.changes.values, "what if: table.key=value of station.toml");
+  command->add_option("--set", arguments.changes.values, "what if: table.key=value of station.toml")
+      ->allow_extra_args(false);
   command->add_option("--config", arguments.changes.config, "what if: another station.toml")
       ->check(CLI::ExistingFile);
   for (const char* role : {"calibration", "pattern", "views", "model", "features"}) {
