@@ -44,6 +44,12 @@ RecorderService::~RecorderService() {
   }
   GiveUpWhatIsMissing();
   PerformAll(machine_.OnStop(Now(), SettledUs()));
+  TakeAll();
+  PerformAll(machine_.OnEnd(Now()));  // it says which part's file could not be closed
+  TakeAll();
+}
+
+void RecorderService::TakeAll() {
   writer_.Drain();
   for (const WriterReport& report : writer_.TakeReports()) {
     Take(report);

@@ -67,6 +67,8 @@ class RecorderService {
   void Perform(const RecordingNote& note);
   void PerformAll(const RecordingMachine::Actions& actions);
   void Take(const WriterReport& report);
+  // When everything given to the writer is done.
+  void TakeAll();
   void UpdateSpace();
   void Tick();
   std::int64_t SettledUs() const;

@@ -90,7 +90,10 @@ void RecordingWriter::Open(FileId file, std::string path, fsmsg::recording_opene
   Queue(
       [this, file, path = std::move(path), opened = std::move(opened), files = std::move(files)]() mutable {
         if (const Status status = Begin(file, path, opened, files); !status.ok()) {
-          files_.erase(file);
+          if (files_.erase(file) > 0) {  // it was made, and holds nothing that was said on the bus
+            std::error_code ignored;
+            std::filesystem::remove(path + ".part", ignored);
+          }
           Report(FileFailed{file, status.error().message});
         } else {
           Report(FileOpened{file});

@@ -57,6 +57,7 @@ class RecordingWriter {
   ~RecordingWriter();
 
   // PATH.part is made; `opened` is its first event, the station's files follow. file_count is filled in here.
+  // A file that cannot take them is removed again.
   void Open(FileId file, std::string path, fsmsg::recording_opened_t opened, std::vector<StationFile> files);
   // False: the backlog is full, and the message is not taken.
   bool Write(FileId file, const char* channel, std::int64_t utime, std::shared_ptr<const Bytes> message);

@@ -92,7 +92,9 @@ Result<LogWriter> LogWriter::Create(const std::string& path) {
   close(fd);
   lcm_eventlog_t* log = lcm_eventlog_create(part.c_str(), "w");
   if (log == nullptr) {
-    return Fail(ErrorCode::kIo, "{} cannot be opened for writing ({})", part, std::strerror(errno));
+    const int reason = errno;
+    unlink(part.c_str());
+    return Fail(ErrorCode::kIo, "{} cannot be opened for writing ({})", part, std::strerror(reason));
   }
   return LogWriter(path, log);
 }
