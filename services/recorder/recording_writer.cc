@@ -156,8 +156,7 @@ void RecordingWriter::Close(FileId file, RecordingName name, fsmsg::recording_cl
         With(file, [&](OpenFile& open) {
           Status status = Finish(open, name, closed);
           if (status.ok()) {
-            Report(FileClosed{file, name.part.has_value(), open.log.path(), open.log.file_bytes(),
-                              closed.gaps.size()});
+            Report(FileClosed{file, name.part.has_value(), closed.gaps.size()});
           }
           return status;
         });
@@ -183,7 +182,7 @@ void RecordingWriter::Prune(const RecordingStore& store, const RetentionRules& r
       [this, store, rules, now_us] {
         std::vector<std::string> open;
         for (const auto& [file, held] : files_) {
-          open.push_back(held.log.path() + ".part");
+          open.push_back(held.log.open_path());
         }
         const PruneOutcome outcome = store.Prune(rules, open, now_us);
         for (const Deletion& deletion : outcome.deleted) {
@@ -193,6 +192,10 @@ void RecordingWriter::Prune(const RecordingStore& store, const RetentionRules& r
         for (const std::string& error : outcome.errors) {
           Report(WriterNote{WriterNote::What::kError, error});
         }
+        if (!outcome.doubt.empty() && !doubts_age_) {  // once, not after every part
+          Report(WriterNote{WriterNote::What::kError, outcome.doubt});
+        }
+        doubts_age_ = !outcome.doubt.empty();
       },
       0);
 }
