@@ -170,11 +170,12 @@ bool StationRunner::WaitFor(double patience_s, const Condition& condition) {
 }
 
 void StationRunner::StopOne(const std::string& name) {
+  const double patience_s = policy_.StopPatience(name);
   processes_.Signal(name, SIGTERM);
-  if (WaitFor(policy_.stop_patience_s, [&] { return processes_.Reaped(name); })) {
+  if (WaitFor(patience_s, [&] { return processes_.Reaped(name); })) {
     return;
   }
-  log_.Write(name, fmt::format("has not stopped within {} s: KILLED", policy_.stop_patience_s), true);
+  log_.Write(name, fmt::format("has not stopped within {} s: KILLED", patience_s), true);
   processes_.Signal(name, SIGKILL);
   killed_.push_back(name);
   WaitFor(policy_.stop_patience_s, [&] { return processes_.Reaped(name); });

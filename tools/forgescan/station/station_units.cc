@@ -87,7 +87,7 @@ class Units {
   std::string UnitOf(const std::string& service) const { return prefix_ + "-" + service + ".service"; }
   // Units of the services before this one in the order of starting; of all, for an empty name.
   std::vector<std::string> Before(const std::string& service) const;
-  std::string Supervision() const;
+  std::string Supervision(const std::string& service) const;
 
   const Station& station_;
   const SupervisionPolicy& policy_;
@@ -133,12 +133,12 @@ UnitFile Units::Route() const {
 
 // systemd's own limits, from the same policy. It has no growing back-off: the pause is that of the second
 // restart.
-std::string Units::Supervision() const {
+std::string Units::Supervision(const std::string& service) const {
   return fmt::format(
       "Restart=on-failure\nRestartSec={}\nTimeoutStartSec={}\nTimeoutStopSec={}\nWatchdogSec={}\n"
       "WatchdogSignal=SIGKILL\n",
       std::min(policy_.backoff_s, 1.0), std::ceil(policy_.start_patience_s),
-      std::ceil(policy_.stop_patience_s), policy_.silence_s);
+      std::ceil(policy_.StopPatience(service)), policy_.silence_s);
 }
 
 UnitFile Units::Service(const StationService& service) const {
@@ -156,7 +156,7 @@ UnitFile Units::Service(const StationService& service) const {
       "[Service]\nType=notify\nNotifyAccess=main\nExecStart={} --station {}\nUser={}\nGroup={}\n{}",
       service.name, station_.name, prefix_ + ".target", prefix_ + "-route.service",
       prefix_ + "-route.service", fmt::join(before, " "), start_limit, command, options_.folder,
-      options_.user, options_.user, Supervision());
+      options_.user, options_.user, Supervision(service.name));
   text += fmt::format("MemoryMax={}\nCPUWeight={}\nTasksMax=256\nLimitNOFILE=1024\nLimitCORE=0\n",
                       limits.memory, limits.cpu_weight);
   text += kHardening;

@@ -14,6 +14,7 @@ Result<SupervisionPolicy> SupervisionPolicy::Load(ConfigTable table) {
   table.Optional("keep_running", policy.keep_running);
   table.Optional("drain_s", policy.drain_s, 0.0, 600.0);
   table.Optional("stop_patience_s", policy.stop_patience_s, 0.1, 600.0);
+  table.Optional("recorder_stop_patience_s", policy.recorder_stop_patience_s, 0.1, 3600.0);
   if (policy.backoff_max_s < policy.backoff_s) {
     table.Reject("backoff_max_s", "is less than backoff_s");
   }

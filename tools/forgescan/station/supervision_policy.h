@@ -1,6 +1,7 @@
 // When a service is taken for hung, how soon it is started again, and when the station gives it up.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <string>
 
@@ -19,6 +20,12 @@ struct SupervisionPolicy {
   bool keep_running = true;     // the rest of the station, when a service is given up
   double drain_s = 20;          // when the station stops: for the parts in work
   double stop_patience_s = 10;  // from SIGTERM to SIGKILL
+  // The same for the recorder, which writes its whole backlog then: 1.5 GB by default.
+  double recorder_stop_patience_s = 60;
+
+  double StopPatience(const std::string& service) const {
+    return service == "recorder" ? std::max(stop_patience_s, recorder_stop_patience_s) : stop_patience_s;
+  }
 
   // Reads the table [supervision]; every key is optional. Errors: as ConfigTable; the first wait longer than
   // the longest.

@@ -54,6 +54,15 @@ TEST(StationUnits, OneAServiceATargetAndARoute) {
   EXPECT_THAT(texts.at("forgescan-cell-1.target"), HasSubstr("forgescan-cell-1-report.service"));
 }
 
+TEST(StationUnits, TheRecorderHasTimeToWriteWhatItHasReceived) {
+  const auto texts = TextsOf("socketcan:can0");
+  EXPECT_THAT(texts.at("forgescan-cell-1-recorder.service"), HasSubstr("TimeoutStopSec=60\n"));
+  EXPECT_THAT(texts.at("forgescan-cell-1-robot.service"), HasSubstr("TimeoutStopSec=10\n"));
+  SupervisionPolicy patient;
+  patient.stop_patience_s = 90;
+  EXPECT_EQ(patient.StopPatience("recorder"), 90);
+}
+
 TEST(StationUnits, AStationWithCanOverUdpNeedsNoCanSocketsButARouteMore) {
   const auto texts = TextsOf("udp:239.74.163.2:43113");
   EXPECT_THAT(texts.at("forgescan-cell-1-robot.service"), Not(HasSubstr("AF_CAN")));
