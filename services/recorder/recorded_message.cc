@@ -6,6 +6,7 @@
 #include "services/common/bus/big_endian.h"
 #include "services/common/bus/channels.h"
 #include "services/common/bus/codec.h"
+#include "services/common/bus/stream_header.h"
 #include "services/recorder/gaps.h"
 
 namespace forgescan {
@@ -26,27 +27,26 @@ std::optional<std::int32_t> PartIn(const ChannelInfo& channel, ByteView bytes) {
 
 }  // namespace
 
-StreamMessage ReadStreamMessage(const ChannelInfo& channel, ByteView bytes, std::int64_t now_us) {
-  StreamMessage read;
-  read.message.now_us = now_us;
-  read.message.bytes = static_cast<std::int64_t>(bytes.size());
+RecordedMessage ReadStreamMessage(const ChannelInfo& channel, ByteView bytes, std::int64_t now_us) {
+  RecordedMessage read;
+  read.now_us = now_us;
+  read.bytes = static_cast<std::int64_t>(bytes.size());
   const auto header = ReadStreamHeader(bytes);
   const auto utime = StreamUtime(bytes);
   if (!header.ok() || !utime.ok()) {
     return read;
   }
-  read.message.utime = *utime;
-  read.header = *header;
-  read.message.part = PartIn(channel, bytes);
+  read.utime = *utime;
+  read.part = PartIn(channel, bytes);
   const std::string_view name = channel.name;
   if (name == kPartArrived.name) {
-    read.message.kind = RecordedMessage::Kind::kArrived;
+    read.kind = RecordedMessage::Kind::kArrived;
   } else if (name == kPartSorted.name) {
-    read.message.kind = RecordedMessage::Kind::kSorted;
+    read.kind = RecordedMessage::Kind::kSorted;
   } else if (name == kVerdict.name) {
     const auto verdict = Decode<fsmsg::verdict_t>(bytes);
-    read.message.kind = verdict.ok() ? RecordedMessage::Kind::kJudged : RecordedMessage::Kind::kStream;
-    read.message.verdict = verdict.ok() ? verdict->verdict : std::int8_t{0};
+    read.kind = verdict.ok() ? RecordedMessage::Kind::kJudged : RecordedMessage::Kind::kStream;
+    read.verdict = verdict.ok() ? verdict->verdict : std::int8_t{0};
   }
   return read;
 }

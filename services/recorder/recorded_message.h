@@ -3,19 +3,13 @@
 
 #include "services/common/bus/bus.h"
 #include "services/common/bus/channel_list.h"
-#include "services/common/bus/stream_header.h"
 #include "services/recorder/recording_machine.h"
 
 namespace forgescan {
 
-struct StreamMessage {
-  RecordedMessage message;
-  StreamHeader header;
-};
-
 // Of a message on a stream, delivered at `now_us`. It was checked by the stream's receiver. What does not
 // decode has no part.
-StreamMessage ReadStreamMessage(const ChannelInfo& channel, ByteView bytes, std::int64_t now_us);
+RecordedMessage ReadStreamMessage(const ChannelInfo& channel, ByteView bytes, std::int64_t now_us);
 
 // For a message that is left out for want of room; a state has no number.
 fsmsg::recording_gap_t DroppedGap(const ChannelInfo& channel, ByteView bytes);

@@ -6,30 +6,59 @@ RetentionRules RecorderConfig::retention() const {
   return {.keep_days = keep_days,
           .keep_every_nth_ok = keep_every_nth_ok,
           .keep_newest_ok = keep_newest_ok,
-          .quota_bytes = quota_gb * std::int64_t{1'000'000'000}};
+          .quota_bytes = quota_gb * std::int64_t{1'000'000'000},
+          .min_free_bytes = min_free_bytes()};
 }
+
+namespace {
+
+template <typename Number>
+struct Range {
+  const char* key;
+  Number RecorderConfig::*field;
+  Number least, most;
+};
+
+constexpr Range<double> kTimes[] = {
+    {"settle_s", &RecorderConfig::settle_s, 0.1, 6},  // a stopping station waits no longer
+    {"sorted_timeout_s", &RecorderConfig::sorted_timeout_s, 1, 600},
+    {"part_timeout_s", &RecorderConfig::part_timeout_s, 10, 3600},
+};
+constexpr Range<int> kNumbers[] = {
+    {"backlog_mb", &RecorderConfig::backlog_mb, 100, 16'000},
+    {"min_free_mb", &RecorderConfig::min_free_mb, 0, 1'000'000},
+    {"station_volume_mb", &RecorderConfig::station_volume_mb, 1, 100'000},
+    {"keep_days", &RecorderConfig::keep_days, 1, 3650},
+    {"keep_every_nth_ok", &RecorderConfig::keep_every_nth_ok, 1, 1'000'000},
+    {"keep_newest_ok", &RecorderConfig::keep_newest_ok, 0, 1'000'000},
+    {"quota_gb", &RecorderConfig::quota_gb, 1, 1'000'000},
+};
+
+template <typename Number>
+Status CheckRange(const RecorderConfig& config, const Range<Number>& range) {
+  const Number value = config.*range.field;
+  return value >= range.least && value <= range.most
+             ? Status()
+             : Status(Fail(ErrorCode::kInvalidArgument, "recorder: {} {} is outside {}..{}", range.key, value,
+                           range.least, range.most));
+}
+
+}  // namespace
 
 Status RecorderConfig::Check() const {
   if (folder.empty()) {
     return Fail(ErrorCode::kInvalidArgument, "recorder: folder is empty");
   }
-  if (!(settle_s > 0 && settle_s < sorted_timeout_s && sorted_timeout_s < part_timeout_s)) {
-    return Fail(ErrorCode::kInvalidArgument,
-                "recorder: 0 < settle_s {} < sorted_timeout_s {} < part_timeout_s {} s does not hold",
-                settle_s, sorted_timeout_s, part_timeout_s);
+  for (const auto& range : kTimes) {
+    RETURN_IF_ERROR(CheckRange(*this, range));
   }
-  if (backlog_mb < 100 || backlog_mb > 16'000 || min_free_mb < 0 || station_volume_mb < 1) {
-    return Fail(
-        ErrorCode::kInvalidArgument,
-        "recorder: backlog_mb {} is outside 100..16000, min_free_mb {} below 0, or station_volume_mb {} "
-        "below 1",
-        backlog_mb, min_free_mb, station_volume_mb);
+  for (const auto& range : kNumbers) {
+    RETURN_IF_ERROR(CheckRange(*this, range));
   }
-  if (keep_days < 1 || keep_every_nth_ok < 1 || keep_newest_ok < 0 || quota_gb < 1) {
+  if (!(settle_s < sorted_timeout_s && sorted_timeout_s < part_timeout_s)) {
     return Fail(ErrorCode::kInvalidArgument,
-                "recorder: keep_days {}, keep_every_nth_ok {} and quota_gb {} must be at least 1, "
-                "keep_newest_ok {} at least 0",
-                keep_days, keep_every_nth_ok, quota_gb, keep_newest_ok);
+                "recorder: settle_s {} < sorted_timeout_s {} < part_timeout_s {} s does not hold", settle_s,
+                sorted_timeout_s, part_timeout_s);
   }
   return {};
 }
@@ -37,16 +66,12 @@ Status RecorderConfig::Check() const {
 Result<RecorderConfig> RecorderConfig::Load(ConfigTable table) {
   RecorderConfig config;
   table.Optional("folder", config.folder);
-  table.Optional("settle_s", config.settle_s, 0.1, 6);  // a stopping station waits no longer
-  table.Optional("sorted_timeout_s", config.sorted_timeout_s, 1, 600);
-  table.Optional("part_timeout_s", config.part_timeout_s, 10, 3600);
-  table.Optional("backlog_mb", config.backlog_mb, 100, 16'000);
-  table.Optional("min_free_mb", config.min_free_mb, 0, 1'000'000);
-  table.Optional("station_volume_mb", config.station_volume_mb, 1, 100'000);
-  table.Optional("keep_days", config.keep_days, 1, 3650);
-  table.Optional("keep_every_nth_ok", config.keep_every_nth_ok, 1, 1'000'000);
-  table.Optional("keep_newest_ok", config.keep_newest_ok, 0, 1'000'000);
-  table.Optional("quota_gb", config.quota_gb, 1, 1'000'000);
+  for (const auto& range : kTimes) {
+    table.Optional(range.key, config.*range.field, range.least, range.most);
+  }
+  for (const auto& range : kNumbers) {
+    table.Optional(range.key, config.*range.field, range.least, range.most);
+  }
   RETURN_IF_ERROR(table.Finish());
   RETURN_IF_ERROR(config.Check());
   return config;

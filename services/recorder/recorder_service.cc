@@ -12,7 +12,9 @@ namespace {
 constexpr std::int64_t kTickPeriodUs = 100'000;
 constexpr std::int64_t kStatePeriodUs = 500'000;
 constexpr std::int64_t kPrunePeriodUs = 3'600'000'000;
-constexpr std::int64_t kLingerUs = 1'000'000;  // beyond settle_s, before the recorder stops
+constexpr std::int64_t kPruneShortUs = 60'000'000;  // the same while there is too little space
+constexpr std::int64_t kSyncPeriodUs = 10'000'000;  // of the station's file
+constexpr std::int64_t kLingerUs = 1'000'000;       // beyond settle_s, before the recorder stops
 
 }  // namespace
 
@@ -44,6 +46,12 @@ RecorderService::~RecorderService() {
   }
   GiveUpWhatIsMissing();
   PerformAll(machine_.OnStop(Now(), SettledUs()));
+  TakeAll();
+  PerformAll(machine_.OnEnd(Now()));  // it says which part's file could not be closed
+  TakeAll();
+}
+
+void RecorderService::TakeAll() {
   writer_.Drain();
   for (const WriterReport& report : writer_.TakeReports()) {
     Take(report);
@@ -106,11 +114,11 @@ void RecorderService::Subscribe(const ChannelInfo& channel) {
 }
 
 void RecorderService::OnStream(const ChannelInfo& channel, ByteView bytes) {
-  const StreamMessage read = ReadStreamMessage(channel, bytes, Now());
-  if (read.message.kind == RecordedMessage::Kind::kArrived) {
+  const RecordedMessage message = ReadStreamMessage(channel, bytes, Now());
+  if (message.kind == RecordedMessage::Kind::kArrived) {
     UpdateSpace();
   }
-  Record(channel, read.message, bytes);
+  Record(channel, message, bytes);
 }
 
 void RecorderService::OnState(const ChannelInfo& channel, ByteView bytes) {
@@ -182,6 +190,7 @@ void RecorderService::Perform(const RecordingNote& note) {
 void RecorderService::UpdateSpace() {
   const auto free = store_.FreeBytes();
   free_bytes_ = free.ok() ? *free : 0;
+  short_of_space_ = free_bytes_ < config_.min_free_bytes();
   const std::int64_t left_bytes = free_bytes_ - writer_.backlog_bytes();
   if (!free.ok()) {
     machine_.SetSpace(free.error().message);
@@ -190,6 +199,19 @@ void RecorderService::UpdateSpace() {
                                   store_.folder(), config_.min_free_mb));
   } else {
     machine_.SetSpace("");
+  }
+}
+
+// Nothing on the bus says when, as VIEW_CAPTURED does for a part.
+void RecorderService::SyncStation() {
+  if (Now() - synced_us_ < kSyncPeriodUs) {
+    return;
+  }
+  synced_us_ = Now();
+  for (const auto& [file, open] : files_) {
+    if (!open.name.part.has_value()) {
+      writer_.Sync(file);
+    }
   }
 }
 
@@ -205,10 +227,11 @@ void RecorderService::Tick() {
   UpdateSpace();
   dropping_ = dropping_ && writer_.backlog_bytes() > config_.backlog_bytes() / 2;
   PerformAll(machine_.OnTick(Now(), SettledUs()));
-  if (Now() >= prune_us_) {
-    prune_us_ = Now() + kPrunePeriodUs;
+  if (Now() - pruned_us_ >= (short_of_space_ ? kPruneShortUs : kPrunePeriodUs)) {
+    pruned_us_ = Now();
     writer_.Prune(store_, config_.retention(), Now());
   }
+  SyncStation();
   ShowState();
   if (done_ != nullptr && (!machine_.finishing() || Now() >= finish_until_us_)) {
     std::exchange(done_, nullptr)();

@@ -67,8 +67,11 @@ class RecorderService {
   void Perform(const RecordingNote& note);
   void PerformAll(const RecordingMachine::Actions& actions);
   void Take(const WriterReport& report);
+  // When everything given to the writer is done.
+  void TakeAll();
   void UpdateSpace();
   void Tick();
+  void SyncStation();
   std::int64_t SettledUs() const;
   void PublishState();
   void ShowState();
@@ -87,7 +90,9 @@ class RecorderService {
   bool dropping_ = false;  // the backlog was full, and is not yet half empty
   bool started_ = false;   // it has been recording before
   std::string shown_trouble_;
-  std::int64_t prune_us_ = 0;  // when to look for files that may go
+  bool short_of_space_ = false;
+  std::int64_t pruned_us_ = 0;  // when files that may go were looked for; 0 = to be done at once
+  std::int64_t synced_us_ = 0;  // when the station's file was last brought to the disk
   std::function<void()> done_;
   std::int64_t finish_until_us_ = 0;
   std::vector<Bus::TimerId> timers_;

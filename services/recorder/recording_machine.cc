@@ -12,8 +12,8 @@ namespace {
 
 using Kind = RecordedMessage::Kind;
 
-// More parts are not in the cell at the same time: the oldest is then closed.
-constexpr std::size_t kMaxOpenParts = 8;
+// A file that could not be closed is past: long enough for everybody who holds parts back to hear of it.
+constexpr std::int64_t kTroubleShownUs = 10'000'000;
 
 std::int64_t Us(double seconds) { return static_cast<std::int64_t>(seconds * 1e6); }
 
@@ -23,84 +23,6 @@ RecordingMachine::Actions RecordingMachine::Start(std::int64_t now_us) {
   Actions actions;
   OpenVolume(now_us, actions);
   return actions;
-}
-
-// The files a message may belong to have its number; it is of the newest that had arrived by then. Before its
-// PART_ARRIVED has come, a part is known by its number alone.
-RecordingMachine::Part* RecordingMachine::PartOf(const RecordedMessage& message) {
-  const auto judged = std::find_if(parts_.begin(), parts_.end(), [&](const Part& part) {
-    return part.part == *message.part && part.verdict_us.has_value() && !part.sorted_utime.has_value();
-  });
-  if (message.kind == Kind::kSorted && judged != parts_.end()) {
-    return &*judged;  // sorted after the next part with this number has arrived
-  }
-  for (auto part = parts_.rbegin(); part != parts_.rend(); ++part) {
-    if (part->part == *message.part && Belongs(*part, message)) {
-      return &*part;
-    }
-  }
-  return nullptr;
-}
-
-bool RecordingMachine::Belongs(const Part& part, const RecordedMessage& message) const {
-  if (message.kind == Kind::kArrived) {
-    return part.arrived_utime.has_value() ? *part.arrived_utime == message.utime
-                                          : message.utime <= part.first_utime;
-  }
-  const bool before = part.arrived_utime.has_value() && message.utime < *part.arrived_utime;
-  const bool oldest = std::none_of(parts_.begin(), parts_.end(), [&](const Part& other) {
-    return other.part == part.part && other.file < part.file;
-  });
-  const bool after = part.sorted_utime.has_value() && message.utime > *part.sorted_utime;
-  return !after && (!before || oldest);
-}
-
-bool RecordingMachine::IsLate(const RecordedMessage& message) {
-  const std::int64_t* until = closed_.Find(*message.part);
-  return until != nullptr && message.utime <= *until;
-}
-
-RecordingMachine::Part& RecordingMachine::OpenPart(const RecordedMessage& message, Actions& actions) {
-  if (parts_.size() >= kMaxOpenParts) {
-    Part oldest = std::move(parts_.front());
-    parts_.erase(parts_.begin());
-    oldest.gaps.push_back(GapOf("", "the part was not finished"));
-    ClosePart(std::move(oldest), fmt::format("more than {} parts were open", kMaxOpenParts), message.now_us,
-              actions);
-  }
-  Part part;
-  part.file = ++last_file_;
-  part.part = *message.part;
-  part.first_utime = part.last_utime = message.utime;
-  const bool mixed = std::any_of(parts_.begin(), parts_.end(), [&](const Part& other) {
-    return other.part == part.part && other.last_utime >= message.utime;
-  });
-  if (mixed) {
-    part.gaps.push_back(GapOf("", "messages may be in the recording of an earlier part with this number"));
-  }
-  if (space_trouble_.empty()) {
-    actions.emplace_back(OpenRecording{part.file, message.now_us, part.part, 0});
-  } else {
-    part.writing = Writing::kRefused;
-    const std::string text = fmt::format("part {} is not recorded: {}", part.part, space_trouble_);
-    AddGap(station_.gaps, GapOf("", text));
-    actions.emplace_back(RecordingNote{RecordingNote::What::kNotRecorded, text});
-  }
-  return parts_.emplace_back(std::move(part));
-}
-
-void RecordingMachine::Note(Part& part, const RecordedMessage& message) const {
-  part.last_us = message.now_us;
-  part.first_utime = std::min(part.first_utime, message.utime);
-  part.last_utime = std::max(part.last_utime, message.utime);
-  if (message.kind == Kind::kArrived) {
-    part.arrived_utime = message.utime;
-  } else if (message.kind == Kind::kJudged) {
-    part.verdict = message.verdict;
-    part.verdict_us = message.now_us;
-  } else if (message.kind == Kind::kSorted) {
-    part.sorted_utime = message.utime;
-  }
 }
 
 RecordingMachine::Actions RecordingMachine::OnMessage(const RecordedMessage& message) {
@@ -156,12 +78,27 @@ void RecordingMachine::OnOpened(FileId file) {
   if (file == station_.file && station_.writing == Writing::kOpening) {
     station_.writing = Writing::kOpen;
     station_trouble_.clear();
+    station_.failed_before = 0;
   }
   for (Part& part : parts_) {
     if (part.file == file && part.writing == Writing::kOpening) {
       part.writing = Writing::kOpen;
     }
   }
+}
+
+void RecordingMachine::OnClosed(FileId file) {
+  std::erase_if(closing_, [file](const ClosingFile& closing) { return closing.file == file; });
+}
+
+void RecordingMachine::OnClosingFailed(const ClosingFile& closing, const std::string& reason,
+                                       std::int64_t now_us) {
+  closing_trouble_ = reason;
+  closing_trouble_us_ = now_us;
+  AddGap(station_.gaps,
+         GapOf("", closing.part.has_value() ? fmt::format("the recording of part {} could not be closed: {}",
+                                                          *closing.part, reason)
+                                            : "the volume before this one could not be closed: " + reason));
 }
 
 void RecordingMachine::OnFailed(FileId file, const std::string& reason, std::int64_t now_us) {
@@ -178,6 +115,12 @@ void RecordingMachine::OnFailed(FileId file, const std::string& reason, std::int
              GapOf("", fmt::format("part {} is recorded in part only: {}", part.part, reason)));
     }
   }
+  const auto closing = std::find_if(closing_.begin(), closing_.end(),
+                                    [file](const ClosingFile& one) { return one.file == file; });
+  if (closing != closing_.end()) {
+    OnClosingFailed(*closing, reason, now_us);
+    closing_.erase(closing);
+  }
 }
 
 bool RecordingMachine::Finished(const Part& part, std::int64_t now_us) const {
@@ -192,13 +135,15 @@ bool RecordingMachine::Quiet(const Part& part, std::int64_t now_us, std::int64_t
 
 void RecordingMachine::ClosePart(Part part, const std::string& reason, std::int64_t now_us,
                                  Actions& actions) {
-  closed_.Insert(part.part, part.sorted_utime.value_or(part.last_utime));
+  const std::int64_t until_utime = std::max(part.sorted_utime.value_or(part.last_utime), part.last_utime);
+  closed_.Insert(part.part, {part.arrived_utime, part.first_utime, until_utime, std::nullopt});
   if (!part.written()) {
     return;  // what there is stays a .part
   }
   if (!part.arrived_utime.has_value()) {
     part.gaps.push_back(GapOf("PART_ARRIVED", "the recording began after the part had arrived"));
   }
+  closing_.push_back({part.file, part.part});
   actions.emplace_back(
       CloseRecording{part.file, now_us, part.part, part.verdict, reason, std::move(part.gaps)});
 }
@@ -206,6 +151,9 @@ void RecordingMachine::ClosePart(Part part, const std::string& reason, std::int6
 RecordingMachine::Actions RecordingMachine::OnTick(std::int64_t now_us, std::int64_t settled_us) {
   Actions actions;
   RenewVolume(now_us, actions);
+  if (now_us - closing_trouble_us_ >= kTroubleShownUs) {
+    closing_trouble_.clear();
+  }
   for (std::size_t i = 0; i < parts_.size();) {
     Part& part = parts_[i];
     const bool overdue = now_us - part.last_us >= Us(config_.part_timeout_s);
@@ -237,6 +185,11 @@ RecordingMachine::Actions RecordingMachine::OnStop(std::int64_t now_us, std::int
     }
     ClosePart(std::move(part), "the recorder was stopped", now_us, actions);
   }
+  return actions;
+}
+
+RecordingMachine::Actions RecordingMachine::OnEnd(std::int64_t now_us) {
+  Actions actions;
   CloseVolume("the recorder was stopped", now_us, actions);
   return actions;
 }

@@ -1,8 +1,14 @@
 // Names of recordings, and what they say of their content. Pure.
-//   parts/20261122T141507.123456Z_part000042.lcmlog.part           open, or left behind by a recorder that
-//   died parts/20261122T141507.123456Z_part000042_OK.lcmlog             closed and complete, with the part's
-//   verdict parts/20261122T141507.123456Z_part000042_NOT_OK_INCOMPLETE.lcmlog     closed, something is
-//   missing station/20261122T141507.123456Z.lcmlog                         of the station itself
+//
+//   open, or left behind by a recorder that died:
+//     parts/20261122T141507.123456Z_part000042.lcmlog.part
+//   closed and complete, with the part's verdict:
+//     parts/20261122T141507.123456Z_part000042_OK.lcmlog
+//   closed, something is missing:
+//     parts/20261122T141507.123456Z_part000042_NOT_OK_INCOMPLETE.lcmlog
+//   of the station itself:
+//     station/20261122T141507.123456Z.lcmlog
+//
 // They sort by time.
 #pragma once
 

@@ -1,5 +1,8 @@
 #include "services/recorder/recording_store.h"
 
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -15,6 +18,56 @@ namespace fs = std::filesystem;
 
 constexpr const char* kFolders[] = {"parts", "station"};
 
+Result<std::shared_ptr<const int>> Lock(const std::string& folder) {
+  const std::string path = (fs::path(folder) / "recorder.lock").string();
+  const int fd = open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
+  if (fd < 0) {
+    return Fail(ErrorCode::kIo, "the recordings cannot be kept in {}: {} cannot be made ({})", folder, path,
+                std::strerror(errno));
+  }
+  std::shared_ptr<const int> lock(new int(fd), [](const int* held) {
+    close(*held);
+    delete held;
+  });
+  if (flock(fd, LOCK_EX | LOCK_NB) != 0) {
+    return errno == EWOULDBLOCK
+               ? Fail(ErrorCode::kUnavailable,
+                      "the recordings cannot be kept in {}: another recorder keeps its recordings there",
+                      folder)
+               : Fail(ErrorCode::kIo, "the recordings cannot be kept in {}: {} cannot be locked ({})", folder,
+                      path, std::strerror(errno));
+  }
+  return lock;
+}
+
+// Each folder may be on a disk of its own.
+Result<FreeSpace> FreeOf(const std::string& folder) {
+  FreeSpace free;
+  for (const char* name : kFolders) {
+    std::error_code problem;
+    const fs::path path = fs::path(folder) / name;
+    const fs::space_info space = fs::space(path, problem);
+    struct stat status {};
+    if (problem || stat(path.c_str(), &status) != 0) {
+      return Fail(ErrorCode::kIo, "the free space of {} cannot be told: {}", path.string(),
+                  problem ? problem.message() : std::strerror(errno));
+    }
+    free[status.st_dev] = static_cast<std::int64_t>(space.available);
+  }
+  return free;
+}
+
+// A recording's file; nothing for anything else, and for what somebody has deleted meanwhile.
+std::optional<StoredRecording> RecordingAt(const fs::path& path) {
+  struct stat status {};
+  if (!ParseRecordingName(path.filename().string()) || lstat(path.c_str(), &status) != 0 ||
+      !S_ISREG(status.st_mode)) {
+    return std::nullopt;
+  }
+  const std::int64_t changed_us = status.st_mtim.tv_sec * 1'000'000 + status.st_mtim.tv_nsec / 1000;
+  return StoredRecording{path.string(), status.st_size, false, changed_us, status.st_dev};
+}
+
 }  // namespace
 
 Result<RecordingStore> RecordingStore::Open(const std::string& folder) {
@@ -27,25 +80,23 @@ Result<RecordingStore> RecordingStore::Open(const std::string& folder) {
                   problem ? problem.message() : std::strerror(errno));
     }
   }
-  return RecordingStore(folder);
+  ASSIGN_OR_RETURN(auto lock, Lock(folder));
+  return RecordingStore(folder, std::move(lock));
 }
 
 std::string RecordingStore::PathOf(const RecordingName& name) const {
-  RecordingName shown = name;
-  std::string text = NameOf(shown);
+  fs::path file = NameOf(name);
   if (!name.closed) {
-    text.resize(text.size() - std::string_view(".part").size());
+    file.replace_extension();  // .part
   }
-  return (fs::path(folder_) / (name.part.has_value() ? "parts" : "station") / text).string();
+  return (fs::path(folder_) / (name.part.has_value() ? "parts" : "station") / file).string();
 }
 
 Result<std::int64_t> RecordingStore::FreeBytes() const {
-  std::error_code problem;
-  const fs::space_info space = fs::space(folder_, problem);
-  if (problem) {
-    return Fail(ErrorCode::kIo, "the free space of {} cannot be told: {}", folder_, problem.message());
-  }
-  return static_cast<std::int64_t>(space.available);
+  ASSIGN_OR_RETURN(const FreeSpace free, FreeOf(folder_));
+  return std::min_element(free.begin(), free.end(),
+                          [](const auto& x, const auto& y) { return x.second < y.second; })
+      ->second;
 }
 
 Result<std::vector<StoredRecording>> RecordingStore::List() const {
@@ -55,11 +106,8 @@ Result<std::vector<StoredRecording>> RecordingStore::List() const {
     const fs::path folder = fs::path(folder_) / name;
     for (fs::directory_iterator entry(folder, problem), end; !problem && entry != end;
          entry.increment(problem)) {
-      std::error_code gone;  // deleted by somebody meanwhile
-      const bool regular = entry->is_regular_file(gone) && !entry->is_symlink(gone);
-      const auto bytes = regular ? entry->file_size(gone) : 0;
-      if (regular && !gone && ParseRecordingName(entry->path().filename().string()).has_value()) {
-        files.push_back({entry->path().string(), static_cast<std::int64_t>(bytes), false});
+      if (auto file = RecordingAt(entry->path())) {
+        files.push_back(std::move(*file));
       }
     }
     if (problem) {
@@ -74,13 +122,18 @@ PruneOutcome RecordingStore::Prune(const RetentionRules& rules, const std::vecto
                                    std::int64_t now_us) const {
   auto files = List();
   if (!files.ok()) {
-    return {{}, {files.error().message}};
+    return {{}, {files.error().message}, ""};
   }
   for (StoredRecording& file : *files) {
     file.open = std::find(open.begin(), open.end(), file.path) != open.end();
   }
+  const auto free = FreeOf(folder_);
+  if (!free.ok()) {
+    return {{}, {free.error().message}, ""};
+  }
   PruneOutcome outcome;
-  const RetentionPlan plan = PlanRetention(*files, rules, now_us);
+  const RetentionPlan plan = PlanRetention(*files, rules, *free, now_us);
+  outcome.doubt = plan.doubt;
   for (const Deletion& deletion : plan.deletions) {
     std::error_code problem;
     if (fs::remove(deletion.path, problem)) {

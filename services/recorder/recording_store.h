@@ -1,6 +1,7 @@
 // The folder of the recordings.
 #pragma once
 
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -13,17 +14,20 @@ namespace forgescan {
 struct PruneOutcome {
   std::vector<Deletion> deleted;
   std::vector<std::string> errors;
+  std::string doubt;  // as in RetentionPlan
 };
 
 class RecordingStore {
  public:
-  // Makes the folders. Errors: kIo (they cannot be made, or not be written).
+  // Makes the folders, and locks them for as long as this or a copy of it lives: two recorders on one folder
+  // would take each other's open files for left-overs. Errors: kIo (they cannot be made, or not be written),
+  // kUnavailable (another recorder has them).
   static Result<RecordingStore> Open(const std::string& folder);
 
   const std::string& folder() const { return folder_; }
   // Where a recording is while it is open, without the ending .part; where it is when it is closed.
   std::string PathOf(const RecordingName& name) const;
-  // Errors: kIo.
+  // On the disk of the parts or of the station's recordings, the smaller. Errors: kIo.
   Result<std::int64_t> FreeBytes() const;
   // Every file with the name of a recording. Errors: kIo.
   Result<std::vector<StoredRecording>> List() const;
@@ -32,8 +36,11 @@ class RecordingStore {
                      std::int64_t now_us) const;
 
  private:
-  explicit RecordingStore(std::string folder) : folder_(std::move(folder)) {}
+  RecordingStore(std::string folder, std::shared_ptr<const int> lock)
+      : folder_(std::move(folder)), lock_(std::move(lock)) {}
+
   std::string folder_;
+  std::shared_ptr<const int> lock_;  // a file descriptor
 };
 
 }  // namespace forgescan

@@ -90,7 +90,10 @@ void RecordingWriter::Open(FileId file, std::string path, fsmsg::recording_opene
   Queue(
       [this, file, path = std::move(path), opened = std::move(opened), files = std::move(files)]() mutable {
         if (const Status status = Begin(file, path, opened, files); !status.ok()) {
-          files_.erase(file);
+          if (files_.erase(file) > 0) {  // it was made, and holds nothing that was said on the bus
+            std::error_code ignored;
+            std::filesystem::remove(path + ".part", ignored);
+          }
           Report(FileFailed{file, status.error().message});
         } else {
           Report(FileOpened{file});
@@ -153,8 +156,7 @@ void RecordingWriter::Close(FileId file, RecordingName name, fsmsg::recording_cl
         With(file, [&](OpenFile& open) {
           Status status = Finish(open, name, closed);
           if (status.ok()) {
-            Report(FileClosed{file, name.part.has_value(), open.log.path(), open.log.file_bytes(),
-                              closed.gaps.size()});
+            Report(FileClosed{file, name.part.has_value(), closed.gaps.size()});
           }
           return status;
         });
@@ -180,7 +182,7 @@ void RecordingWriter::Prune(const RecordingStore& store, const RetentionRules& r
       [this, store, rules, now_us] {
         std::vector<std::string> open;
         for (const auto& [file, held] : files_) {
-          open.push_back(held.log.path() + ".part");
+          open.push_back(held.log.open_path());
         }
         const PruneOutcome outcome = store.Prune(rules, open, now_us);
         for (const Deletion& deletion : outcome.deleted) {
@@ -190,6 +192,10 @@ void RecordingWriter::Prune(const RecordingStore& store, const RetentionRules& r
         for (const std::string& error : outcome.errors) {
           Report(WriterNote{WriterNote::What::kError, error});
         }
+        if (!outcome.doubt.empty() && !doubts_age_) {  // once, not after every part
+          Report(WriterNote{WriterNote::What::kError, outcome.doubt});
+        }
+        doubts_age_ = !outcome.doubt.empty();
       },
       0);
 }

@@ -36,8 +36,6 @@ struct FileFailed {
 struct FileClosed {
   FileId file = 0;
   bool part = false;  // not the station's
-  std::string path;
-  std::int64_t bytes = 0;
   std::size_t gaps = 0;
 };
 // Without consequence for a recording: what was deleted, or could not be, or a station's file that is gone.
@@ -57,6 +55,7 @@ class RecordingWriter {
   ~RecordingWriter();
 
   // PATH.part is made; `opened` is its first event, the station's files follow. file_count is filled in here.
+  // A file that cannot take them is removed again.
   void Open(FileId file, std::string path, fsmsg::recording_opened_t opened, std::vector<StationFile> files);
   // False: the backlog is full, and the message is not taken.
   bool Write(FileId file, const char* channel, std::int64_t utime, std::shared_ptr<const Bytes> message);
@@ -104,6 +103,7 @@ class RecordingWriter {
   bool stopping_ = false;
   std::vector<WriterReport> reports_;
   std::map<FileId, OpenFile> files_;  // of the writer's thread alone
+  bool doubts_age_ = false;           // of the writer's thread alone; as PruneOutcome says
   std::thread thread_;                // last: everything it uses is there before it
 };
 

@@ -2,11 +2,19 @@
 //
 // For keep_days stays every part that is NOT_OK, not decidable, not inspected, without verdict or incomplete,
 // every station's recording, and of the OK parts each whose number is a multiple of keep_every_nth_ok. The
-// newest keep_newest_ok OK parts stay whatever their age. Beyond the quota go the oldest OK parts first, then
-// the oldest others; never an open file, never the newest OK parts.
+// newest keep_newest_ok OK parts stay whatever their age. Beyond the quota, and where a disk has less free
+// than a part needs, go the oldest OK parts first, then the oldest others; never an open file, never the
+// newest OK parts.
+//
+// A recording's time is that in its name or of its last change, the later of the two. It is not believed
+// blindly, as a clock may have been wrong:
+//   - before 2026 no recording was made: such a file is of unknown age, and counts as new;
+//   - after a pause longer than keep_days nothing from before it is deleted by age until the recordings since
+//     then span keep_days themselves: a clock that was set too far ahead looks like such a pause.
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -17,12 +25,15 @@ struct RetentionRules {
   int keep_every_nth_ok = 20;
   int keep_newest_ok = 200;
   std::int64_t quota_bytes = 500'000'000'000;
+  std::int64_t min_free_bytes = 0;  // on every disk with recordings
 };
 
 struct StoredRecording {
   std::string path;
   std::int64_t bytes = 0;
-  bool open = false;  // being written now
+  bool open = false;            // being written now
+  std::int64_t changed_us = 0;  // us since 1970 UTC of the last change; 0 = not known
+  std::uint64_t disk = 0;       // equal for files on one disk
 };
 
 struct Deletion {
@@ -34,10 +45,14 @@ struct Deletion {
 struct RetentionPlan {
   std::vector<Deletion> deletions;    // in the order in which they should go
   std::int64_t bytes_over_quota = 0;  // that may not be deleted
+  std::string doubt;  // why nothing goes by age that would otherwise; empty = nothing is held back
 };
 
-// Files whose names are not those of recordings are left alone and not counted.
+using FreeSpace = std::map<std::uint64_t, std::int64_t>;  // by disk
+
+// Files whose names are not those of recordings are left alone and not counted. A disk that is not in `free`
+// has room.
 RetentionPlan PlanRetention(const std::vector<StoredRecording>& files, const RetentionRules& rules,
-                            std::int64_t now_us);
+                            const FreeSpace& free, std::int64_t now_us);
 
 }  // namespace forgescan

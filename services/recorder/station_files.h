@@ -18,7 +18,8 @@ struct StationFile {
 };
 
 // station.toml, and by role with the file's own extension: calibration.yaml, pattern.toml, views.toml,
-// model.bundle, features.toml. Errors: as CheckStationFile, of the first that is wrong.
+// model.bundle, features.toml. Errors: kNotFound, kInvalidArgument (larger than
+// kMaxStationFileBytes), of the first that is wrong.
 Result<std::vector<StationFile>> StationFilesOf(const Station& station);
 
 // utime is left 0. Errors: kNotFound, kIo, kInvalidArgument (larger than kMaxStationFileBytes).

@@ -37,7 +37,7 @@ void ExpectAllLoad(const ConfigFile& file) {
   ExpectLoaded(FusionConfig::Load(file.Table("fusion")));
   ExpectLoaded(RegistrationConfig::Load(file.Table("registration")));
   ExpectLoaded(ReportConfig::Load(file.Table("report")));
-  ExpectLoaded(SupervisionPolicy::Load(file.Table("supervision")));
+  ExpectLoaded(SupervisionPolicy::Load(file));
 }
 
 TEST(StationFiles, TheTemplateIsOneTheServicesAccept) {
@@ -56,7 +56,7 @@ TEST(StationFiles, SoIsWhatStandsInItAsComment) {
   const auto file = ConfigFile::Parse(whole, "template/station.toml");
   ASSERT_TRUE(file.ok()) << file.error().message;
   ExpectAllLoad(*file);
-  EXPECT_EQ(SupervisionPolicy::Load(file->Table("supervision"))->silence_s, SupervisionPolicy().silence_s);
+  EXPECT_EQ(SupervisionPolicy::Load(*file)->silence_s, SupervisionPolicy().silence_s);
   EXPECT_EQ(ReportConfig::Load(file->Table("report"))->part_timeout_s, ReportConfig().part_timeout_s);
   EXPECT_EQ(FusionConfig::Load(file->Table("fusion"))->view_timeout_s, FusionConfig().view_timeout_s);
   EXPECT_EQ(RobotConfig::Load(file->Table("robot"))->gate_timeout_s, RobotConfig().gate_timeout_s);
@@ -66,7 +66,7 @@ TEST(StationFiles, TheVirtualOnesNameTheSupervisionThatTheyNeed) {
   for (const char* name : {"virtual", "virtual-small"}) {
     const auto station = Station::Load(kStations + name);
     ASSERT_TRUE(station.ok()) << station.error().message;
-    ExpectLoaded(SupervisionPolicy::Load(station->file.Table("supervision")));
+    ExpectLoaded(SupervisionPolicy::Load(station->file));
   }
 }
 

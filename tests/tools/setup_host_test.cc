@@ -1,4 +1,5 @@
-// tools/setup-host on the files of another system: nothing of this computer is touched.
+// tools/setup-host on the files of another system, and what tools/spy makes of a station: nothing of this
+// computer is touched.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -8,6 +9,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <sstream>
 #include <string>
 
 namespace {
@@ -28,9 +30,10 @@ class SetupHost : public ::testing::Test {
   }
   ~SetupHost() override { fs::remove_all(root_); }
 
-  Output Call(const std::string& arguments) const {
+  Output Call(const std::string& arguments) const { return Run("setup-host " + arguments); }
+  static Output Run(const std::string& tool) {
     Output output;
-    const std::string command = FORGESCAN_SOURCE_DIR "/tools/setup-host " + arguments + " 2>&1";
+    const std::string command = FORGESCAN_SOURCE_DIR "/tools/" + tool + " 2>&1";
     FILE* pipe = popen(command.c_str(), "r");
     std::array<char, 4096> buffer{};
     while (std::fgets(buffer.data(), buffer.size(), pipe) != nullptr) {
@@ -78,10 +81,78 @@ TEST_F(SetupHost, MendsAFileThatWasChanged) {
   EXPECT_EQ(CallOnRoot("--check").exit_code, 0);
 }
 
+TEST_F(SetupHost, EnablesTheRouteForTheNextBoot) {
+  const char* link = "etc/systemd/system/multi-user.target.wants/forgescan-route.service";
+  EXPECT_THAT(CallOnRoot().text, HasSubstr("enabled: forgescan-route.service\n"));
+  EXPECT_EQ(fs::read_symlink(root_ / link), "/etc/systemd/system/forgescan-route.service");
+  fs::remove(root_ / link);
+  const Output check = CallOnRoot("--check");
+  EXPECT_EQ(check.exit_code, 1);
+  EXPECT_THAT(check.text, HasSubstr("forgescan-route.service is not enabled"));
+  EXPECT_EQ(CallOnRoot().text, "enabled: forgescan-route.service\n");
+  EXPECT_EQ(CallOnRoot("--check").exit_code, 0);
+}
+
+TEST_F(SetupHost, LowersNoBufferThatAnotherFileMakesLarger) {
+  fs::create_directories(root_ / "etc/sysctl.d");
+  std::ofstream(root_ / "etc/sysctl.d/50-other.conf")
+      << "# net.core.rmem_max = 999999999\nnet.core.rmem_default=8388608\n-net/core/rmem_max = 268435456";
+  ASSERT_EQ(CallOnRoot().exit_code, 0);
+  EXPECT_THAT(Read("etc/sysctl.d/60-forgescan.conf"), HasSubstr("net.core.rmem_max = 268435456\n"));
+  EXPECT_THAT(Read("etc/sysctl.d/60-forgescan.conf"), HasSubstr("net.core.rmem_default = 16777216\n"));
+  EXPECT_EQ(CallOnRoot("--check").exit_code, 0);
+}
+
 TEST_F(SetupHost, RefusesWhatItDoesNotKnow) {
   EXPECT_EQ(Call("--root").exit_code, 2);
   EXPECT_EQ(Call("--root /nowhere/at/all").exit_code, 2);
   EXPECT_THAT(Call("--fast").text, HasSubstr("usage: setup-host"));
+}
+
+// tools/spy without its viewer: which bus it would listen to, and where.
+class Spy : public SetupHost {
+ protected:
+  std::string AddressOf(const std::string& bus) const {
+    std::ofstream(root_ / "station.toml")
+        << "[station]\nname = \"x\"\nbus = \"" << bus << "\"   # a comment\n";
+    return Run("spy --address " + root_.string()).text;
+  }
+};
+
+TEST_F(Spy, LeavesTheReceiveBufferOutOfTheAddress) {
+  const std::string bus = "udpm://239.255.76.68:7668";
+  EXPECT_EQ(AddressOf(bus), bus + "\n239.255.76.68\n");
+  EXPECT_EQ(AddressOf(bus + "?ttl=0"), bus + "?ttl=0\n239.255.76.68\n");
+  EXPECT_EQ(AddressOf(bus + "?recv_buf_size=104857600"), bus + "\n239.255.76.68\n");
+  EXPECT_EQ(AddressOf(bus + "?recv_buf_size=1&ttl=0"), bus + "?ttl=0\n239.255.76.68\n");
+  EXPECT_EQ(AddressOf(bus + "?ttl=0&recv_buf_size=1"), bus + "?ttl=0\n239.255.76.68\n");
+}
+
+TEST_F(Spy, NamesAStationThatIsNotThere) {
+  const Output none = Run("spy --address " + root_.string());
+  EXPECT_EQ(none.exit_code, 2);
+  EXPECT_THAT(none.text, HasSubstr("station.toml"));
+}
+
+// A process number that a crash left in the file may be anybody's.
+TEST_F(Spy, JoinsTheNetworkOfALivingSupervisorOnly) {
+  const std::string stat = [] {
+    std::ifstream stream("/proc/self/stat");
+    return std::string(std::istreambuf_iterator<char>(stream), {});
+  }();
+  std::istringstream fields(stat.substr(stat.rfind(')') + 1));
+  std::string ticks;
+  for (int field = 3; field <= 22; ++field) {
+    fields >> ticks;
+  }
+  AddressOf("udpm://239.1.2.3:7667");
+  const auto supervisor = [&](const std::string& started) {
+    std::ofstream(root_ / "station.pid") << getpid() << " " << started << " 120\nfusion 0 0 0 0\n";
+    return Run("spy --supervisor " + root_.string());
+  };
+  EXPECT_EQ(supervisor(ticks).text, std::to_string(getpid()) + "\n");
+  EXPECT_EQ(supervisor("1").exit_code, 1);
+  EXPECT_EQ(supervisor("").exit_code, 1);
 }
 
 }  // namespace

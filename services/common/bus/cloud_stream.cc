@@ -48,6 +48,33 @@ bool IsConsistent(const fsmsg::cloud_slice_t& slice) {
          slice.data.size() == count * kPointBytes;
 }
 
+Error Contradicts(const fsmsg::cloud_slice_t& slice) {
+  return Fail(ErrorCode::kFormat, "part {} view {}: slice {} of {} contradicts its cloud", slice.part,
+              slice.view, slice.slice, slice.slice_count);
+}
+
+// All slices of a cloud, each consistent with it.
+Result<PointCloud> Join(const std::vector<std::optional<fsmsg::cloud_slice_t>>& slices) {
+  std::int32_t points = 0;
+  for (const auto& slice : slices) {
+    if (slice->first_point != points) {
+      return Contradicts(*slice);
+    }
+    points += slice->points;
+  }
+  if (points != slices.back()->points_total) {
+    return Contradicts(*slices.back());
+  }
+  PointCloud cloud;
+  Resize(cloud, static_cast<std::size_t>(points));
+  for (const auto& slice : slices) {
+    for (std::size_t i = 0; i < static_cast<std::size_t>(slice->points); ++i) {
+      Unpack(slice->data.data() + i * kPointBytes, static_cast<std::size_t>(slice->first_point) + i, cloud);
+    }
+  }
+  return cloud;
+}
+
 }  // namespace
 
 Result<std::vector<fsmsg::cloud_slice_t>> SliceCloud(const PointCloud& cloud, std::int64_t utime, int part,
@@ -84,9 +111,9 @@ CloudAssembler::Open& CloudAssembler::OpenFor(const fsmsg::cloud_slice_t& slice)
   const Key key{slice.part, slice.view, slice.utime};
   if (open_.Find(key) == nullptr) {
     Open open;
-    Resize(open.cloud, static_cast<std::size_t>(slice.points_total));
-    open.have.assign(static_cast<std::size_t>(slice.slice_count), false);
-    open.missing = open.have.size();
+    open.points_total = static_cast<std::size_t>(slice.points_total);
+    open.slices.resize(static_cast<std::size_t>(slice.slice_count));
+    open.missing = open.slices.size();
     open_.Insert(key, std::move(open));
   }
   return *open_.Find(key);
@@ -95,25 +122,21 @@ CloudAssembler::Open& CloudAssembler::OpenFor(const fsmsg::cloud_slice_t& slice)
 Result<std::optional<PointCloud>> CloudAssembler::Add(const fsmsg::cloud_slice_t& slice) {
   const Key key{slice.part, slice.view, slice.utime};
   Open* open = IsConsistent(slice) ? &OpenFor(slice) : nullptr;
-  if (open == nullptr || open->have.size() != static_cast<std::size_t>(slice.slice_count) ||
-      open->cloud.size() != static_cast<std::size_t>(slice.points_total)) {
+  if (open == nullptr || open->slices.size() != static_cast<std::size_t>(slice.slice_count) ||
+      open->points_total != static_cast<std::size_t>(slice.points_total)) {
     open_.Take(key);
-    return Fail(ErrorCode::kFormat, "part {} view {}: slice {} of {} contradicts its cloud", slice.part,
-                slice.view, slice.slice, slice.slice_count);
+    return Contradicts(slice);
   }
-  const auto index = static_cast<std::size_t>(slice.slice);
-  if (!open->have[index]) {
-    open->have[index] = true;
+  auto& place = open->slices[static_cast<std::size_t>(slice.slice)];
+  if (!place) {
+    place = slice;
     --open->missing;
-    for (std::size_t i = 0; i < static_cast<std::size_t>(slice.points); ++i) {
-      Unpack(slice.data.data() + i * kPointBytes, static_cast<std::size_t>(slice.first_point) + i,
-             open->cloud);
-    }
   }
   if (open->missing > 0) {
     return std::optional<PointCloud>();
   }
-  return std::optional<PointCloud>(std::move(open_.Take(key)->cloud));
+  ASSIGN_OR_RETURN(PointCloud cloud, Join(open_.Take(key)->slices));
+  return std::optional<PointCloud>(std::move(cloud));
 }
 
 void CloudAssembler::Forget(int part) {

@@ -24,13 +24,15 @@ Result<std::vector<fsmsg::cloud_slice_t>> SliceCloud(const PointCloud& cloud, st
 // Collects slices of several clouds at once, in any order. Slices belong together if part, view and utime are
 // equal: another attempt at a view, or another part with the same number, is another cloud. At most 8 clouds
 // are open; a further one takes the place of the oldest, which on a stream has lost slices that the bus has
-// counted.
+// counted. Memory: what has come, whatever the slices say of the rest; twice that while the last one is
+// added.
 class CloudAssembler {
  public:
   static constexpr std::size_t kMaxOpen = 8;
 
   // The whole cloud when this was its last slice; nothing while slices are missing.
-  // Errors: kFormat (sizes that contradict each other); the cloud's slices so far are dropped then.
+  // Errors: kFormat (sizes that contradict each other, slices that are not the cloud's points one after the
+  // other); the cloud's slices so far are dropped then.
   Result<std::optional<PointCloud>> Add(const fsmsg::cloud_slice_t& slice);
   // Drops what has come of a part that will not be finished: all of it, or the clouds of this utime.
   void Forget(int part);
@@ -38,8 +40,8 @@ class CloudAssembler {
 
  private:
   struct Open {
-    PointCloud cloud;
-    std::vector<bool> have;
+    std::size_t points_total = 0;
+    std::vector<std::optional<fsmsg::cloud_slice_t>> slices;
     std::size_t missing = 0;
   };
   // The open cloud of a consistent slice, begun if it is the first.

@@ -12,7 +12,8 @@ namespace forgescan {
 // array of several dimensions is an array of arrays.
 //
 // As strict as Decode() of codec.h. Errors: kFormat (unknown type, truncated, trailing bytes, impossible
-// sizes). Memory: no array is begun that has more elements than the message has bytes left.
+// sizes, more values than the message can hold). Memory: no array is begun that has more elements than the
+// message has bytes left, and there are at most four values a byte and 10000 more; an array or struct is one.
 Result<nlohmann::ordered_json> DecodeToJson(const LcmTypes& types, ByteView message);
 
 }  // namespace forgescan

@@ -122,6 +122,9 @@ class Parser {
         ASSIGN_OR_RETURN(package_, TypeName());
         RETURN_IF_ERROR(tokens_.Require(";"));
       } else if (word == "struct") {
+        if (structs.size() >= kMaxLcmStructs) {
+          return Fail(ErrorCode::kFormat, "the text defines more than {} structs", kMaxLcmStructs);
+        }
         ASSIGN_OR_RETURN(structs.emplace_back(), Struct());
       } else {
         return tokens_.Wrong(word, "\"struct\" or \"package\"");
@@ -143,18 +146,21 @@ class Parser {
   std::string WithPackage(const std::string& type) const {
     return package_.empty() || type.find('.') != std::string::npos ? type : package_ + "." + type;
   }
-  static Status CheckIsNew(const LcmStruct& type, const std::string& name) {
-    const bool is_constant = std::any_of(type.constants.begin(), type.constants.end(),
-                                         [&](const LcmConstant& constant) { return constant.name == name; });
-    return is_constant || type.HasField(name)
-               ? Status(Fail(ErrorCode::kFormat, "{} has two members {}", type.name, name))
-               : Status();
+  // A constant, or the field that comes next in the struct that is being read.
+  Status AddMember(const LcmStruct& type, const std::string& name, std::optional<std::size_t> field) {
+    if (members_.size() >= kMaxLcmMembers) {
+      return Fail(ErrorCode::kFormat, "{} has more than {} members", type.name, kMaxLcmMembers);
+    }
+    return members_.try_emplace(name, field).second
+               ? Status()
+               : Status(Fail(ErrorCode::kFormat, "{} has two members {}", type.name, name));
   }
 
   Result<LcmStruct> Struct() {
     LcmStruct type;
     ASSIGN_OR_RETURN(const std::string name, Name());
     type.name = WithPackage(name);
+    members_.clear();
     RETURN_IF_ERROR(tokens_.Require("{"));
     while (!tokens_.Try("}")) {
       RETURN_IF_ERROR(tokens_.Try("const") ? Constants(type) : Fields(type));
@@ -168,7 +174,7 @@ class Parser {
     do {
       LcmConstant constant{"", constant_type, ""};
       ASSIGN_OR_RETURN(constant.name, Name());
-      RETURN_IF_ERROR(CheckIsNew(type, constant.name));
+      RETURN_IF_ERROR(AddMember(type, constant.name, std::nullopt));
       RETURN_IF_ERROR(tokens_.Require("="));
       constant.value = tokens_.Take();
       if (constant.value.empty() ||
@@ -187,11 +193,15 @@ class Parser {
     do {
       LcmField field{"", primitive ? word : WithPackage(word), primitive, {}};
       ASSIGN_OR_RETURN(field.name, Name());
-      RETURN_IF_ERROR(CheckIsNew(type, field.name));
       while (tokens_.Try("[")) {
+        if (field.dimensions.size() >= kMaxLcmDimensions) {
+          return Fail(ErrorCode::kFormat, "{}.{} has more than {} dimensions", type.name, field.name,
+                      kMaxLcmDimensions);
+        }
         ASSIGN_OR_RETURN(field.dimensions.emplace_back(), Dimension(type));
         RETURN_IF_ERROR(tokens_.Require("]"));
       }
+      RETURN_IF_ERROR(AddMember(type, field.name, type.fields.size()));
       type.fields.push_back(std::move(field));
     } while (tokens_.Try(","));
     return tokens_.Require(";");
@@ -202,12 +212,11 @@ class Parser {
     const std::string_view token = tokens_.Take();
     LcmDimension dimension{std::string(token), 0, 0};
     if (IsName(token)) {
-      const auto counter = std::find_if(type.fields.begin(), type.fields.end(),
-                                        [&](const LcmField& field) { return field.name == token; });
-      if (counter == type.fields.end() || !IsCounter(*counter)) {
+      const auto counter = members_.find(token);
+      if (counter == members_.end() || !counter->second || !IsCounter(type.fields[*counter->second])) {
         return tokens_.Wrong(token, "a number or an earlier integer field");
       }
-      dimension.counter = static_cast<std::size_t>(counter - type.fields.begin());
+      dimension.counter = *counter->second;
       return dimension;
     }
     // As C reads numbers: 0x for hexadecimal, 0 for octal.
@@ -225,6 +234,8 @@ class Parser {
 
   Tokens tokens_;
   std::string package_;
+  // Of the struct that is being read: the index of a field, nothing for a constant.
+  std::map<std::string, std::optional<std::size_t>, std::less<>> members_;
 };
 
 }  // namespace

@@ -74,10 +74,6 @@ Status CheckNesting(const LcmTypes& types) {
 
 }  // namespace
 
-bool LcmStruct::HasField(std::string_view field) const {
-  return std::any_of(fields.begin(), fields.end(), [field](const LcmField& f) { return f.name == field; });
-}
-
 bool LcmStruct::IsStream() const {
   constexpr std::array<std::pair<const char*, LcmPrimitive>, 4> kHeader{{{"utime", LcmPrimitive::kInt64},
                                                                          {"session", LcmPrimitive::kInt64},
@@ -106,6 +102,8 @@ Result<LcmTypes> LcmTypes::Parse(std::string_view text) {
     }
   }
   RETURN_IF_ERROR(CheckNesting(types));
+  std::transform(types.structs_.begin(), types.structs_.end(), std::back_inserter(types.own_hashes_),
+                 HashOfOwnFields);
   for (std::size_t i = 0; i < types.structs_.size(); ++i) {
     types.by_fingerprint_.try_emplace(types.Fingerprint(types.structs_[i]), i);
   }
@@ -137,7 +135,7 @@ std::uint64_t LcmTypes::Hash(const LcmStruct& type, std::vector<const LcmStruct*
     return 0;
   }
   within.push_back(&type);
-  std::uint64_t hash = HashOfOwnFields(type);
+  std::uint64_t hash = own_hashes_[static_cast<std::size_t>(&type - structs_.data())];
   for (const LcmField& field : type.fields) {
     if (!field.primitive) {
       hash += Hash(*Find(field.type), within);

@@ -16,6 +16,12 @@ namespace forgescan {
 
 // Structs within structs.
 inline constexpr std::size_t kMaxLcmDepth = 32;
+// Of an array.
+inline constexpr std::size_t kMaxLcmDimensions = 16;
+// Fields and constants of a struct.
+inline constexpr std::size_t kMaxLcmMembers = 5000;
+// In one text.
+inline constexpr std::size_t kMaxLcmStructs = 2000;
 
 enum class LcmPrimitive { kInt8, kInt16, kInt32, kInt64, kByte, kFloat, kDouble, kString, kBoolean };
 
@@ -44,12 +50,11 @@ struct LcmStruct {
   std::vector<LcmConstant> constants;
   // True if the struct begins with the fields of a stream message (services/common/bus/stream_header.h).
   bool IsStream() const;
-  bool HasField(std::string_view field) const;
 };
 
 // The structs of a text in LCM's language, in its order: packages, several structs, comments, constants,
-// arrays of any dimension. Enumerations are refused: lcm-gen writes no valid C++ for them. Errors: kFormat
-// (with the line).
+// arrays. Enumerations are refused: lcm-gen writes no valid C++ for them. Errors: kFormat (with the line;
+// also for more structs, members or dimensions than the limits above).
 Result<std::vector<LcmStruct>> ParseLcmDefinitions(std::string_view text);
 
 // Types that are complete: every struct that a field names is among them.
@@ -74,6 +79,7 @@ class LcmTypes {
   std::uint64_t Hash(const LcmStruct& type, std::vector<const LcmStruct*>& within) const;
 
   std::vector<LcmStruct> structs_;
+  std::vector<std::uint64_t> own_hashes_;  // of the fields alone, by struct
   std::map<std::string, std::size_t, std::less<>> by_name_;
   std::map<std::int64_t, std::size_t> by_fingerprint_;
 };

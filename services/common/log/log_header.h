@@ -25,9 +25,16 @@ struct LogHeader {
 inline constexpr std::size_t kMaxLogHeadBytes = kLogHeaderBytes + kMaxLogChannelBytes;
 
 bool HasLogSyncWord(ByteView bytes);
+// What a channel's name may consist of. Every name is UTF-8 without control characters; pure ASCII says more
+// for a header that may be none.
+enum class LogNames { kAscii, kUtf8 };
 // Takes the numbers and the channel's name from bytes that begin at `offset` of the file. Nothing if the
-// bytes are too few, a length is out of its range (log_format.h) or the name is not printable. Does not look
+// bytes are too few, a length is out of its range (log_format.h) or the name is no such name. Does not look
 // at the sync word, and does not know where the file ends.
-std::optional<LogHeader> ParseLogHeader(ByteView bytes, std::uint64_t offset);
+std::optional<LogHeader> ParseLogHeader(ByteView bytes, std::uint64_t offset, LogNames names);
+bool IsAscii(const std::string& name);
+// Bytes of the character in UTF-8 that the text begins with; 0 = none, or a control character. text: not
+// empty.
+std::size_t PrintableBytes(ByteView text);
 
 }  // namespace forgescan

@@ -17,7 +17,7 @@
 namespace forgescan {
 
 Result<LogReader> LogReader::Open(const std::string& path) {
-  const int fd = open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  const int fd = open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);  // nor wait for a pipe's other end
   if (fd < 0) {
     return Fail(errno == ENOENT ? ErrorCode::kNotFound : ErrorCode::kIo, "{}: {}", path,
                 std::strerror(errno));
@@ -74,7 +74,7 @@ Result<Bytes> LogReader::Read(const LogEntry& entry, std::size_t at_most) const 
   if (!status.ok()) {
     return Fail(status.error().code, "{}: {}", path_, status.error().message);
   }
-  const auto header = ParseLogHeader(head_bytes, entry.offset);
+  const auto header = ParseLogHeader(head_bytes, entry.offset, LogNames::kUtf8);
   if (!HasLogSyncWord(head_bytes) || !header || header->number != entry.number ||
       header->bytes != entry.bytes) {
     return Fail(ErrorCode::kIo, "{}: the event at byte {} has changed since the file was opened", path_,

@@ -49,6 +49,10 @@ class LogReader {
   const std::vector<LogDamage>& damage() const { return damage_; }   // in file order; empty = whole
   const std::vector<std::string>& channels() const { return channels_; }
   const std::string& ChannelOf(const LogEntry& entry) const { return channels_[entry.channel]; }
+  // Of the event in the file.
+  std::uint64_t EndOf(const LogEntry& entry) const {
+    return entry.offset + kLogHeaderBytes + ChannelOf(entry).size() + entry.bytes;
+  }
   // The message, or at most its first bytes. Errors: kIo (the file has changed or cannot be read).
   Result<Bytes> Read(const LogEntry& entry, std::size_t at_most = kMaxLogMessageBytes) const;
 

@@ -10,6 +10,7 @@ constexpr std::size_t kWalkBytes = 64 << 10;  // small events come many at a tim
 constexpr std::size_t kScanBytes = 1 << 20;
 constexpr std::size_t kProbeBytes = 512;  // a look at one place far away
 constexpr std::uint64_t kMostMissingEvents = 1'000'000;
+constexpr std::uint64_t kDoubtPerByte = 16, kDoubtBytes = 16 << 20;
 
 // The numbers of the two say that `later` was written some events after `earlier`. They begin at 0 in each
 // log; what only looks like a header has any number.
@@ -31,7 +32,7 @@ LogScanner::LogScanner(int fd, std::uint64_t file_bytes)
 
 Result<LogIndex> LogScanner::Run() {
   for (std::uint64_t at = 0; at < file_bytes_;) {
-    const std::optional<LogHeader> event = HeaderAt(walk_, at);
+    const std::optional<LogHeader> event = ExpectedAt(at);
     if (event && IsCredibleHere(*event)) {
       Accept(*event);
       at = event->end();
@@ -47,9 +48,11 @@ Result<LogIndex> LogScanner::Run() {
   return std::move(index_);
 }
 
-std::optional<LogHeader> LogScanner::HeaderAt(FileWindow& window, std::uint64_t offset) const {
+std::optional<LogHeader> LogScanner::HeaderAt(FileWindow& window, std::uint64_t offset,
+                                              LogNames names) const {
   const ByteView bytes = window.From(offset, kMaxLogHeadBytes);
-  std::optional<LogHeader> header = HasLogSyncWord(bytes) ? ParseLogHeader(bytes, offset) : std::nullopt;
+  std::optional<LogHeader> header =
+      HasLogSyncWord(bytes) ? ParseLogHeader(bytes, offset, names) : std::nullopt;
   return header && header->end() <= file_bytes_ ? header : std::nullopt;
 }
 
@@ -105,20 +108,29 @@ const LogScanner::Ahead& LogScanner::LookAhead(std::uint64_t from) {
 }
 
 bool LogScanner::IsCredibleHere(const LogHeader& event) {
-  const auto next = HeaderAt(walk_, event.end());
+  const auto next = ExpectedAt(event.end());
   if (next && IsNext(event.number, next->number)) {
     return true;
   }
   const bool is_followed = next || event.end() == file_bytes_;
+  if (!is_followed && !IsAscii(event.channel)) {
+    return false;
+  }
   return !IsTooLong(event) && (is_followed || !IsTooShort(event));
+}
+
+bool LogScanner::MayLookFurther(std::uint64_t looked_bytes) {
+  looked_bytes_ += looked_bytes;
+  return looked_bytes_ <= kDoubtPerByte * file_bytes_ + kDoubtBytes;
 }
 
 // An event within the claimed extent that was written after this one, by its number, says so. So does a row
 // of events that runs across the end of the extent; a row that ends before it may as well be a log that the
 // message contains.
 bool LogScanner::IsTooLong(const LogHeader& event) {
-  std::optional<LogHeader> inner = NextHeader(event.offset + 1, event.end());
-  while (inner) {
+  std::uint64_t from = event.offset + 1;
+  std::optional<LogHeader> inner = NextHeader(from, event.end());
+  while (MayLookFurther((inner ? inner->offset : event.end()) - from) && inner) {
     if (Succeeds(event.number, inner->number)) {
       return true;
     }
@@ -129,14 +141,15 @@ bool LogScanner::IsTooLong(const LogHeader& event) {
         return true;
       }
     }
-    inner = NextHeader(next, event.end());
+    from = next;
+    inner = NextHeader(from, event.end());
   }
   return false;
 }
 
 std::uint64_t LogScanner::EndOfRow(const LogHeader& first, std::uint64_t to) {
   std::uint64_t end = first.end();
-  while (end < to) {
+  while (end < to && MayLookFurther(kProbeBytes)) {
     const auto next = HeaderAt(probe_, end);
     if (!next) {
       break;
@@ -148,19 +161,25 @@ std::uint64_t LogScanner::EndOfRow(const LogHeader& first, std::uint64_t to) {
 
 // If no event is missing between this one and the next, the bytes between them are the rest of this one.
 bool LogScanner::IsTooShort(const LogHeader& event) {
+  if (!MayLookFurther(0)) {
+    return false;
+  }
   const auto& sound = LookAhead(event.end()).sound;
   const std::uint64_t to = sound ? sound->offset + 1 : file_bytes_;
-  for (auto next = NextHeader(event.end(), to); next; next = NextHeader(next->offset + 1, to)) {
+  std::uint64_t from = event.end();
+  for (auto next = NextHeader(from, to); MayLookFurther((next ? next->offset : to) - from) && next;
+       next = NextHeader(from, to)) {
     if (Succeeds(event.number, next->number)) {
       return IsNext(event.number, next->number);
     }
+    from = next->offset + 1;
   }
   return false;
 }
 
 std::uint64_t LogScanner::Resume(std::uint64_t from) {
   const ByteView bytes = walk_.From(from, kMaxLogHeadBytes);
-  const auto unsynced = HasLogSyncWord(bytes) ? std::nullopt : ParseLogHeader(bytes, from);
+  const auto unsynced = HasLogSyncWord(bytes) ? std::nullopt : ParseLogHeader(bytes, from, LogNames::kAscii);
   if (unsynced && unsynced->end() <= file_bytes_ && IsSound(*unsynced)) {
     return unsynced->end();  // only the sync word is wrong
   }
@@ -195,7 +214,7 @@ std::string LogScanner::Describe(std::uint64_t from, std::uint64_t to) {
     return "zeros";
   }
   const ByteView bytes = walk_.From(from, kMaxLogHeadBytes);
-  const auto header = ParseLogHeader(bytes, from);
+  const auto header = ParseLogHeader(bytes, from, LogNames::kAscii);
   if (!HasLogSyncWord(bytes)) {
     return header && header->end() == to ? "an event with a bad sync word" : "bytes without a header";
   }

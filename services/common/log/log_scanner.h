@@ -6,7 +6,12 @@
 // followed so may still be good, with damage behind it, or its length may be wrong; other events within its
 // extent, and the numbers of the events behind it, decide which.
 //
-// Cost: linear in the file where it is damaged, one small read an event where it is not.
+// A channel's name that is not pure ASCII is believed where an event is expected, if the next event or the
+// end of the file follows; not where events are searched for.
+//
+// Cost: linear in the file where it is damaged, one small read an event where it is not. Doubts about lengths
+// are looked into as long as that costs no more than kDoubtPerByte passes over the file; in a file that is
+// made to raise more, an event's length is then taken as it stands.
 #pragma once
 
 #include <optional>
@@ -36,7 +41,12 @@ class LogScanner {
 
  private:
   // The credible header at this place of the file, if there is one.
-  std::optional<LogHeader> HeaderAt(FileWindow& window, std::uint64_t offset) const;
+  std::optional<LogHeader> HeaderAt(FileWindow& window, std::uint64_t offset,
+                                    LogNames names = LogNames::kAscii) const;
+  // The same where an event is expected.
+  std::optional<LogHeader> ExpectedAt(std::uint64_t offset) {
+    return HeaderAt(walk_, offset, LogNames::kUtf8);
+  }
   // The first credible header in [from, to).
   std::optional<LogHeader> NextHeader(std::uint64_t from, std::uint64_t to);
   std::optional<LogHeader> NextSound(std::uint64_t from, std::uint64_t to);
@@ -53,6 +63,7 @@ class LogScanner {
   bool IsCredibleHere(const LogHeader& event);
   bool IsTooLong(const LogHeader& event);
   bool IsTooShort(const LogHeader& event);
+  bool MayLookFurther(std::uint64_t looked_bytes);
   // Where the row of events that begins with `first` ends; events beyond `to` are not looked at.
   std::uint64_t EndOfRow(const LogHeader& first, std::uint64_t to);
   // Where the next event begins after damage at `from`; the end of the file if there is none.
@@ -65,6 +76,7 @@ class LogScanner {
 
   std::uint64_t file_bytes_;
   FileWindow walk_, scan_, probe_;
+  std::uint64_t looked_bytes_ = 0;  // for doubts about lengths
   std::optional<Ahead> ahead_;
   std::unordered_map<std::string, std::uint32_t> channel_index_;
   LogIndex index_;

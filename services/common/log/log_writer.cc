@@ -12,11 +12,10 @@
 #include <utility>
 
 #include "services/common/log/log_format.h"
+#include "services/common/new_file.h"
 
 namespace forgescan {
 namespace {
-
-std::string PartOf(const std::string& path) { return path + ".part"; }
 
 // The name of a new file is on the disk only when its folder is.
 Status SyncFolderOf(const std::string& path) {
@@ -35,28 +34,14 @@ Status SyncFolderOf(const std::string& path) {
   return {};
 }
 
-// Refuses to replace a file. Some file systems cannot do so in one step; there a look before has to do.
-Status RenameToNew(const std::string& from, const std::string& to) {
-  int outcome = renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE);
-  if (outcome != 0 && (errno == EINVAL || errno == ENOSYS)) {
-    if (access(to.c_str(), F_OK) == 0) {
-      errno = EEXIST;
-    } else {
-      outcome = rename(from.c_str(), to.c_str());
-    }
-  }
-  if (outcome != 0) {
-    return Fail(ErrorCode::kIo, "{} cannot be renamed to {} ({})", from, to, std::strerror(errno));
-  }
-  return {};
-}
-
 }  // namespace
 
-LogWriter::LogWriter(std::string path, _lcm_eventlog_t* log) : path_(std::move(path)), log_(log) {}
+LogWriter::LogWriter(std::string path, std::string open_path, _lcm_eventlog_t* log)
+    : path_(std::move(path)), open_path_(std::move(open_path)), log_(log) {}
 
 LogWriter::LogWriter(LogWriter&& other) noexcept
     : path_(std::move(other.path_)),
+      open_path_(std::move(other.open_path_)),
       log_(std::exchange(other.log_, nullptr)),
       events_(other.events_),
       file_bytes_(other.file_bytes_) {}
@@ -67,6 +52,7 @@ LogWriter& LogWriter::operator=(LogWriter&& other) noexcept {
       lcm_eventlog_destroy(log_);
     }
     path_ = std::move(other.path_);
+    open_path_ = std::move(other.open_path_);
     log_ = std::exchange(other.log_, nullptr);
     events_ = other.events_;
     file_bytes_ = other.file_bytes_;
@@ -80,8 +66,8 @@ LogWriter::~LogWriter() {
   }
 }
 
-Result<LogWriter> LogWriter::Create(const std::string& path) {
-  const std::string part = PartOf(path);
+Result<LogWriter> LogWriter::Create(const std::string& path, const std::string& ending) {
+  const std::string part = path + ending;
   if (access(path.c_str(), F_OK) == 0) {
     return Fail(ErrorCode::kIo, "{} exists already; a recording is never overwritten", path);
   }
@@ -92,9 +78,13 @@ Result<LogWriter> LogWriter::Create(const std::string& path) {
   close(fd);
   lcm_eventlog_t* log = lcm_eventlog_create(part.c_str(), "w");
   if (log == nullptr) {
-    return Fail(ErrorCode::kIo, "{} cannot be opened for writing ({})", part, std::strerror(errno));
+    const int reason = errno;
+    unlink(part.c_str());
+    return Fail(ErrorCode::kIo, "{} cannot be opened for writing ({})", part, std::strerror(reason));
   }
-  return LogWriter(path, log);
+  LogWriter writer(path, part, log);
+  RETURN_IF_ERROR(SyncFolderOf(part));
+  return writer;
 }
 
 // What is in stdio's buffer must never reach the file after a failure: it is dropped before the file is
@@ -105,9 +95,8 @@ Status LogWriter::Broken(const char* what) {
   const bool whole = ftruncate(fileno(log_->f), file_bytes_) == 0;
   lcm_eventlog_destroy(log_);
   log_ = nullptr;
-  return Fail(ErrorCode::kIo, "{}: {} failed after {} events and {} bytes ({}){}", PartOf(path_), what,
-              events_, file_bytes_, std::strerror(reason),
-              whole ? "" : "; the file may end with half an event");
+  return Fail(ErrorCode::kIo, "{}: {} failed after {} events and {} bytes ({}){}", open_path_, what, events_,
+              file_bytes_, std::strerror(reason), whole ? "" : "; the file may end with half an event");
 }
 
 Status LogWriter::Write(std::string_view channel, std::int64_t utime, ByteView message) {
@@ -144,7 +133,7 @@ Status LogWriter::Sync() {
 Status LogWriter::CloseAs(const std::string& path) {
   RETURN_IF_ERROR(Sync());
   lcm_eventlog_destroy(std::exchange(log_, nullptr));
-  RETURN_IF_ERROR(RenameToNew(PartOf(path_), path));
+  RETURN_IF_ERROR(RenameToNew(open_path_, path));
   path_ = path;
   return SyncFolderOf(path_);
 }

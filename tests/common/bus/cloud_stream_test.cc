@@ -1,6 +1,7 @@
 #include "services/common/bus/cloud_stream.h"
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include <algorithm>
 
@@ -116,6 +117,33 @@ TEST(CloudStream, ContradictionsAreErrorsAndTheNextCloudWorks) {
     EXPECT_FALSE(assembler.Add(bad).ok());
   }
   EXPECT_TRUE(assembler.Add(good)->has_value());
+}
+
+// What is not there takes no memory: 100 million points would be 3 GB.
+TEST(CloudStream, ASliceThatPromisesManyPointsAndBringsOne) {
+  auto slice = SliceCloud(MakeCloud(1), 1, 1, 0)->front();
+  slice.points_total = 100'000'000;
+  slice.slice_count = 2;
+  const auto used_kb = [] {
+    rusage usage{};
+    getrusage(RUSAGE_SELF, &usage);
+    return usage.ru_maxrss;
+  };
+  const auto before_kb = used_kb();
+  CloudAssembler assembler;
+  EXPECT_FALSE((*assembler.Add(slice)).has_value());
+  EXPECT_LT(used_kb() - before_kb, 100'000);
+  slice.slice = 1;
+  EXPECT_FALSE(assembler.Add(slice).ok()) << "together they are not the cloud";
+}
+
+TEST(CloudStream, SlicesOfTheSamePointsAreNoCloud) {
+  auto slices = *SliceCloud(MakeCloud(200'000), 1, 1, 0);
+  slices[1] = slices[0];
+  slices[1].slice = 1;
+  CloudAssembler assembler;
+  EXPECT_FALSE((*assembler.Add(slices[0])).has_value());
+  EXPECT_FALSE(assembler.Add(slices[1]).ok());
 }
 
 TEST(CloudStream, AMissingMemberIsRefused) {

@@ -292,17 +292,5 @@ TEST(LcmDecode, AgreesWithTheGeneratedCodeOnChangedBytes) {
   }
 }
 
-TEST(LcmDecode, BoundsWhatATypeCanDemand) {
-  const LcmTypes types = Types("struct e { } struct t { int32_t n; e many[n][n]; } struct r { r self[1]; }");
-  Bytes message;
-  Append(message, static_cast<std::uint64_t>(types.Fingerprint(*types.Find("t"))), 8);
-  Append(message, 0x7FFFFFFF, 4);
-  EXPECT_THAT(DecodeToJson(types, message).error().message, HasSubstr("has 2147483647 elements"));
-  Bytes recursive;
-  Append(recursive, static_cast<std::uint64_t>(types.Fingerprint(*types.Find("r"))), 8);
-  recursive.resize(1000);
-  EXPECT_THAT(DecodeToJson(types, recursive).error().message, HasSubstr("more than 32 structs"));
-}
-
 }  // namespace
 }  // namespace forgescan

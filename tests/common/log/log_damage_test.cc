@@ -120,7 +120,7 @@ bool HasDamageToReport(const SyntheticLog& log) {
 void ExpectCovered(const LogReader& reader) {
   std::map<std::uint64_t, std::uint64_t> stretches;
   for (const LogEntry& entry : reader.entries()) {
-    stretches[entry.offset] = kLogHeaderBytes + reader.ChannelOf(entry).size() + entry.bytes;
+    stretches[entry.offset] = reader.EndOf(entry) - entry.offset;
   }
   for (const LogDamage& damage : reader.damage()) {
     EXPECT_TRUE(stretches.try_emplace(damage.offset, damage.bytes).second);
@@ -161,7 +161,7 @@ class LogDamageTest : public ::testing::Test {
     }
     int invented = 0;
     for (const LogEntry& entry : reader.entries()) {
-      const std::uint64_t end = entry.offset + kLogHeaderBytes + reader.ChannelOf(entry).size() + entry.bytes;
+      const std::uint64_t end = reader.EndOf(entry);
       const auto same = written.find(entry.offset);
       const bool before_damage = std::any_of(reader.damage().begin(), reader.damage().end(),
                                              [end](const LogDamage& d) { return d.offset == end; });

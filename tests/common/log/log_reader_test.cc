@@ -2,8 +2,10 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -107,6 +109,41 @@ TEST_F(LogReaderTest, RefusesWhatIsNoLog) {
   EXPECT_TRUE(Open(MakeLog(2, 1)).ok());  // works again
 }
 
+TEST_F(LogReaderTest, DoesNotWaitForAPipe) {
+  ASSERT_EQ(mkfifo((folder_ / "pipe").c_str(), 0600), 0);
+  EXPECT_EQ(CodeOf(folder_ / "pipe"), ErrorCode::kIo);
+}
+
+TEST_F(LogReaderTest, ReadsChannelsWithNamesInUtf8) {
+  SyntheticLog log;
+  const std::vector<std::string> names{"Kamera_ö", "A", "カメラ", "Kamera_ö", "é𝄞", "A", "Kamera_ö"};
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    log.Append({static_cast<std::int64_t>(i), 1, names[i], Bytes(100, 7), 0});
+  }
+  const auto reader = Open(log);
+  ASSERT_TRUE(reader.ok()) << reader.error().message;
+  EXPECT_TRUE(reader->damage().empty());
+  ASSERT_EQ(reader->entries().size(), names.size());
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    EXPECT_EQ(reader->ChannelOf(reader->entries()[i]), names[i]);
+    EXPECT_TRUE(reader->Read(reader->entries()[i]).ok());
+  }
+}
+
+TEST_F(LogReaderTest, OtherNamesAreDamage) {
+  for (const std::string name :
+       {"\xF6", "a\xC3", "\xC0\x80", "\xC2\x9B", "\xED\xA0\x80", "\xF5\x80\x80\x80", "a\n"}) {
+    SyntheticLog log;
+    log.Append({0, 1, "A", Bytes(100, 7), 0});
+    log.Append({1, 1, name, Bytes(100, 7), 0});
+    log.Append({2, 1, "A", Bytes(100, 7), 0});
+    const auto reader = Open(log);
+    ASSERT_TRUE(reader.ok()) << reader.error().message;
+    EXPECT_EQ(reader->entries().size(), 2u);
+    EXPECT_EQ(reader->damage().size(), 1u);
+  }
+}
+
 TEST_F(LogReaderTest, NoticesAFileThatChanges) {
   SyntheticLog log = MakeLog(3, 50);
   const auto reader = Open(log);
@@ -166,6 +203,25 @@ TEST_F(LogReaderTest, PassesManySyncWordsAndManyHeaders) {
   EXPECT_EQ(reader->entries()[19].offset, log.events[19].offset);
   ASSERT_FALSE(reader->damage().empty());
   EXPECT_EQ(reader->damage()[0].offset, good);
+}
+
+// Each is followed by junk and may lie between the one before it and the last two; where it ends depends on
+// all behind it. That has taken the square of their number, a minute for these. 10 s: many times what it
+// takes.
+TEST_F(LogReaderTest, PassesManyEventsWithFallingNumbersAndJunkBehindThem) {
+  constexpr int kEvents = 40'000;
+  SyntheticLog log;
+  for (int i = 0; i < kEvents; ++i) {
+    log.Append({kEvents - i, 1, "A", Bytes(3, 7), 0});
+    log.bytes.push_back(0x55);
+  }
+  log.Append({900'000, 1, "A", Bytes(3, 7), 0});
+  log.Append({900'001, 1, "A", Bytes(3, 7), 0});
+  const auto start = std::chrono::steady_clock::now();
+  const auto reader = Open(log);
+  ASSERT_TRUE(reader.ok()) << reader.error().message;
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(10));
+  EXPECT_GT(reader->entries().size(), kEvents / 2U);
 }
 
 }  // namespace

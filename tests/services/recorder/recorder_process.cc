@@ -68,7 +68,7 @@ void RecorderProcess::MakeStation(int receive_buffer_bytes, const std::string& r
 void RecorderProcess::Start(rlim_t file_bytes) {
   recorder_.reset();
   service_.reset();
-  const std::string program = std::string(FORGESCAN_BIN_DIR) + "/forgescan-recorder",
+  const std::string program = fmt::format("{}/forgescan-recorder", FORGESCAN_BIN_DIR),
                     station = (base_ / "station").string(), log = (base_ / "recorder.log").string();
   pid_ = fork();
   if (pid_ == 0) {

@@ -1,19 +1,7 @@
 // The recorder on a simulated bus: what is in its files.
-#include "services/recorder/recorder_service.h"
-
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
-#include <sys/resource.h>
-#include <unistd.h>
 
-#include <csignal>
-#include <filesystem>
-#include <fstream>
-
-#include "services/common/bus/channels.h"
-#include "services/common/bus/sim_bus.h"
-#include "tests/services/recorder/line_script.h"
-#include "tests/services/recorder/recordings.h"
+#include "tests/services/recorder/recorder_rig.h"
 
 namespace forgescan::testing {
 namespace {
@@ -22,56 +10,7 @@ namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using Recorder = fsmsg::recorder_state_t;
-
-constexpr std::int64_t kSecondUs = 1'000'000;
-
-class RecorderServiceTest : public ::testing::Test {
- protected:
-  void SetUp() override {
-    base_ = fs::path(::testing::TempDir()) / ("forgescan_recorder_" + std::to_string(getpid()));
-    fs::remove_all(base_);
-    fs::create_directories(base_);
-    config_.folder = (base_ / "recordings").string();
-    config_.min_free_mb = 1;
-    std::ofstream(base_ / "station.toml") << "# a station\n";
-    station_ = {"test", "1.2.3", "compiler", "abcd", {{"station.toml", (base_ / "station.toml").string()}}};
-    SubscribeState<Recorder>(world_.bus(), kRecorderState,
-                             [this](const Recorder& m) { states_.push_back(m); });
-  }
-  void TearDown() override {
-    service_.reset();
-    fs::remove_all(base_);
-  }
-  void Start() {
-    auto service = RecorderService::Create(hub_, monitor_, config_, station_);
-    ASSERT_TRUE(service.ok()) << service.error().message;
-    service_ = *std::move(service);
-    Settle();
-  }
-  // Until the writer has done what it was told, and the service knows.
-  void Settle() {
-    service_->Drain();
-    network_.RunFor(kSecondUs);
-  }
-  void Run(double seconds) { network_.RunFor(static_cast<std::int64_t>(seconds * 1e6)); }
-  std::vector<Recording> Stop() {
-    service_.reset();
-    return ReadRecordings(config_.folder);
-  }
-  std::function<void()> Pause() {
-    return [this] { network_.RunFor(2'000); };
-  }
-
-  fs::path base_;
-  SimNetwork network_{3};
-  RecorderConfig config_;
-  RecordedStation station_;
-  StreamHub hub_{network_.AddNode(), "recorder"};
-  ServiceMonitor monitor_{hub_, "recorder", "abcd"};
-  StreamHub world_{network_.AddNode(), "world"};
-  std::vector<Recorder> states_;
-  std::unique_ptr<RecorderService> service_;
-};
+using RecorderServiceTest = RecorderRig;
 
 TEST_F(RecorderServiceTest, Starts) {
   Start();
@@ -248,41 +187,6 @@ TEST_F(RecorderServiceTest, ASenderThatStartsAnewIsNoGapByItself) {
 }
 
 // How much is left out depends on the disk of the moment; that nothing goes unsaid does not.
-TEST_F(RecorderServiceTest, WhatTheDiskIsTooSlowForIsLeftOutByNumber) {
-  config_.backlog_mb = 100;
-  std::ofstream(base_ / "large");
-  fs::resize_file(base_ / "large", 60'000'000);
-  for (const char* name : {"a", "b", "c"}) {
-    station_.files.push_back({name, (base_ / "large").string()});
-  }
-  Start();
-  StreamHub sender(network_.AddNode(), "sender", {.history_bytes = 1, .burst_bytes = 1});
-  LineScript line(sender, 5'000'000);
-  line.Begin(7, Pause());
-  for (int view = 0; view < 10; ++view) {
-    line.View(7, view, Pause());
-  }
-  line.End(7, Pause(), 1);
-  Settle();
-  Run(3);
-  const std::int64_t dropped = monitor_.counter("messages_dropped");
-  RecordProperty("dropped", static_cast<int>(dropped));
-  const auto parts = OfPart(Stop(), 7);
-  ASSERT_EQ(parts.size(), 1u);
-  ASSERT_TRUE(parts[0].closed.has_value());
-  std::size_t admitted = 0, held = 0;
-  for (const fsmsg::recording_gap_t& gap : parts[0].closed->gaps) {
-    EXPECT_THAT(gap.reason, HasSubstr("the disk was too slow"));
-    admitted +=
-        gap.first_sequence == 0 ? 0 : static_cast<std::size_t>(gap.last_sequence - gap.first_sequence + 1);
-  }
-  for (const ChannelInfo& channel : AllChannels()) {
-    held += channel.kind == ChannelKind::kStream ? parts[0].On(channel.name).size() : 0;
-  }
-  EXPECT_EQ(held + admitted, line.SaidOf(7));
-  EXPECT_EQ(parts[0].name.complete, dropped == 0);
-}
-
 TEST_F(RecorderServiceTest, AskedToStopItWaitsForTheNewsOfASortedPart) {
   Start();
   LineScript(world_, 1000).Part(7, 1, Pause());
@@ -317,57 +221,7 @@ TEST_F(RecorderServiceTest, WhatARecorderThatDiedHasLeftIsNamedAndNotTouched) {
   EXPECT_EQ(fs::file_size(base_ / "recordings/parts" / left), 13u);
 }
 
-TEST_F(RecorderServiceTest, WithTooLittleSpaceItStopsAndSaysSo) {
-  config_.min_free_mb = 1'000'000'000;
-  Start();
-  ASSERT_FALSE(states_.empty());
-  EXPECT_EQ(states_.back().status, Recorder::STATUS_STOPPED);
-  EXPECT_THAT(states_.back().reason, HasSubstr("1000000000 MB are needed"));
-  LineScript(world_, 1000).Part(7, 1, Pause());
-  Run(3);
-  EXPECT_EQ(monitor_.counter("parts_not_recorded"), 1);
-  const auto recordings = Stop();
-  EXPECT_THAT(OfPart(recordings, 7), IsEmpty());
-  EXPECT_THAT(OfStation(recordings).at(0).closed->gaps.at(0).reason, HasSubstr("part 7 is not recorded"));
-}
-
-TEST_F(RecorderServiceTest, AFailedWriteIsLoudLeavesWholeEventsAndTheNextPartIsRecorded) {
-  Start();
-  LineScript line(world_, 500'000);
-  rlimit before{};
-  getrlimit(RLIMIT_FSIZE, &before);
-  void (*signal)(int) = std::signal(SIGXFSZ, SIG_IGN);
-  const rlimit limit{1'200'000, before.rlim_max};
-  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &limit), 0);
-  line.Begin(7, Pause());
-  line.View(7, 0, Pause());
-  Settle();
-  EXPECT_EQ(monitor_.state(), ServiceState::kError);
-  EXPECT_EQ(states_.back().status, Recorder::STATUS_STOPPED);
-  EXPECT_THAT(states_.back().reason, HasSubstr("File too large"));
-  setrlimit(RLIMIT_FSIZE, &before);
-  std::signal(SIGXFSZ, signal);
-  line.End(7, Pause(), 1);
-  Run(3);
-  EXPECT_EQ(states_.back().status, Recorder::STATUS_RECORDING);
-  line.Part(8, 1, Pause());
-  Run(3);
-  const auto recordings = Stop();
-  const auto broken = OfPart(recordings, 7);
-  ASSERT_EQ(broken.size(), 1u);
-  EXPECT_FALSE(broken[0].closed.has_value());
-  EXPECT_EQ(broken[0].On("FRAME_LEFT").size(), 1u);
-  EXPECT_THAT(OfPart(recordings, 8).at(0).closed->gaps, IsEmpty());
-  EXPECT_THAT(OfStation(recordings).at(0).closed->gaps.at(0).reason, HasSubstr("part 7"));
-}
-
-TEST_F(RecorderServiceTest, AFolderThatCannotBeMadeStopsItAtTheStart) {
-  std::ofstream(base_ / "file") << "no folder";
-  config_.folder = (base_ / "file").string();
-  const auto service = RecorderService::Create(hub_, monitor_, config_, station_);
-  ASSERT_FALSE(service.ok());
-  EXPECT_THAT(service.error().message, HasSubstr("cannot be kept in"));
-}
+// The closing event alone does not fit any more.
 
 }  // namespace
 }  // namespace forgescan::testing

@@ -158,6 +158,7 @@ TEST_F(RecordingMachineTest, StoppingClosesWithAGapWhatWasNotFinished) {
   EXPECT_THAT(Closed(done).gaps, IsEmpty());
   ASSERT_EQ(Closed(unfinished).gaps.size(), 1u);
   EXPECT_THAT(Closed(unfinished).gaps[0].reason, HasSubstr("stopped before the part was finished"));
+  Take(machine_.OnEnd(now_us_));
   EXPECT_THAT(Closed(kStation).gaps, IsEmpty());
 }
 
@@ -183,6 +184,7 @@ TEST_F(RecordingMachineTest, AHoleIsOneOfEveryOpenFile) {
   const FileId three = Say(Kind::kArrived, 3).at(0);
   machine_.OnDropped(three, gap);
   Take(machine_.OnStop(now_us_, kFarUs));
+  Take(machine_.OnEnd(now_us_));
   for (const FileId file : {one, two, three}) {
     ASSERT_EQ(Closed(file).gaps.size(), 2u);
     EXPECT_EQ(Closed(file).gaps[0].first_sequence, 9);

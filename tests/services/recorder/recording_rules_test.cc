@@ -98,7 +98,7 @@ TEST_F(RecordingRulesTest, WithoutSpaceNoPartIsBegunAndItIsSaid) {
   const FileId next = WholePart(8);
   Wait(3);
   EXPECT_THAT(Closed(next).gaps, IsEmpty());
-  Take(machine_.OnStop(now_us_, kFarUs));
+  Take(machine_.OnEnd(now_us_));
   ASSERT_EQ(Closed(kStation).gaps.size(), 1u);
   EXPECT_THAT(Closed(kStation).gaps[0].reason, HasSubstr("part 7"));
 }
@@ -135,9 +135,106 @@ TEST_F(RecordingRulesTest, AfterAFailureTheStationGetsANewVolumeWhenThereIsSpace
   EXPECT_NE(machine_.Trouble(), "") << "not before it is open";
   machine_.OnOpened(2);
   EXPECT_EQ(machine_.Trouble(), "");
-  Take(machine_.OnStop(now_us_, kFarUs));
+  Take(machine_.OnEnd(now_us_));
   ASSERT_EQ(Closed(2).gaps.size(), 1u);
   EXPECT_THAT(Closed(2).gaps[0].reason, HasSubstr("broke off"));
+}
+
+TEST_F(RecordingRulesTest, AChainOfVolumesThatCannotBeOpenedIsSaidOnceAndTriedEverMoreSeldom) {
+  machine_.OnFailed(kStation, "No space left on device", now_us_);
+  FileId last = kStation;
+  for (const double pause_s : {10, 20, 40, 80, 80}) {
+    Wait(pause_s - 0.1);
+    EXPECT_FALSE(files_.contains(last + 1)) << "after less than " << pause_s << " s";
+    Wait(0.1);
+    ASSERT_TRUE(files_.contains(++last)) << "after " << pause_s << " s";
+    machine_.OnFailed(last, "File " + std::to_string(last) + " too large", now_us_);
+  }
+  Wait(80);
+  machine_.OnOpened(++last);
+  Take(machine_.OnEnd(now_us_));
+  ASSERT_EQ(Closed(last).gaps.size(), 1u);
+  EXPECT_THAT(Closed(last).gaps[0].reason, HasSubstr("No space left on device"));
+}
+
+TEST_F(RecordingRulesTest, APartsFileThatCannotBeClosedIsAlarmAndGapOfTheStation) {
+  const FileId file = WholePart(7);
+  machine_.OnOpened(file);
+  Wait(3);
+  EXPECT_FALSE(IsOpen(file));
+  machine_.OnFailed(file, "File too large", now_us_);
+  EXPECT_EQ(machine_.Trouble(), "File too large");
+  Wait(9);
+  EXPECT_EQ(machine_.Trouble(), "File too large") << "long enough to be heard";
+  Wait(2);
+  EXPECT_EQ(machine_.Trouble(), "");
+  Take(machine_.OnEnd(now_us_));
+  ASSERT_EQ(Closed(kStation).gaps.size(), 1u);
+  EXPECT_THAT(Closed(kStation).gaps[0].reason, HasSubstr("part 7 could not be closed: File too large"));
+}
+
+TEST_F(RecordingRulesTest, AFileThatWasClosedCannotFailAnyMore) {
+  const FileId file = WholePart(7);
+  Wait(3);
+  machine_.OnClosed(file);
+  machine_.OnFailed(file, "File too large", now_us_);
+  EXPECT_EQ(machine_.Trouble(), "");
+}
+
+TEST_F(RecordingRulesTest, AVolumeThatCannotBeClosedIsAGapOfTheNext) {
+  Wait(23 * 3600);
+  machine_.OnOpened(2);
+  machine_.OnFailed(kStation, "File too large", now_us_);
+  EXPECT_EQ(machine_.Trouble(), "File too large");
+  Take(machine_.OnEnd(now_us_));
+  ASSERT_EQ(Closed(2).gaps.size(), 1u);
+  EXPECT_THAT(Closed(2).gaps[0].reason, HasSubstr("volume before this one could not be closed"));
+}
+
+TEST_F(RecordingRulesTest, AfterTheSendersClockWasSetBackTheNextPartWithTheNumberHasItsFile) {
+  WholePart(7);
+  const std::int64_t back_us = now_us_ - 3600 * kSecondUs;
+  Wait(3);
+  const FileId second = Say(Kind::kArrived, 7, back_us).at(0);
+  EXPECT_NE(second, kStation);
+  EXPECT_THAT(Say(Kind::kStream, 7, back_us + 10), ElementsAre(second));
+  Say(Kind::kSorted, 7, back_us + 20);
+  Wait(3);
+  EXPECT_THAT(Closed(second).gaps, IsEmpty());
+}
+
+TEST_F(RecordingRulesTest, WhatCameOfItBeforeItsArrivalIsAGap) {
+  WholePart(7);
+  const std::int64_t back_us = now_us_ - 3600 * kSecondUs;
+  Wait(3);
+  EXPECT_THAT(Say(Kind::kStream, 7, back_us + 10), ElementsAre(kStation)) << "nobody can know better";
+  const FileId second = Say(Kind::kArrived, 7, back_us).at(0);
+  Say(Kind::kSorted, 7, back_us + 20);
+  Wait(3);
+  ASSERT_EQ(Closed(second).gaps.size(), 1u);
+  EXPECT_THAT(Closed(second).gaps[0].reason, HasSubstr("may be in the station's recording"));
+}
+
+TEST_F(RecordingRulesTest, AClockSetBackBetweenTwoOpenPartsWithANumberIsAGapOfBoth) {
+  const FileId first = WholePart(7);
+  const std::int64_t back_us = now_us_ - 3600 * kSecondUs;
+  const FileId second = Say(Kind::kArrived, 7, back_us).at(0);
+  EXPECT_NE(first, second);
+  Say(Kind::kSorted, 7, back_us + 20);
+  Wait(3);
+  EXPECT_EQ(Closed(first).gaps.size(), 1u);
+  EXPECT_EQ(Closed(second).gaps.size(), 1u);
+}
+
+TEST_F(RecordingRulesTest, APartThatWasSortedBeforeWhatCameOfItIsNotWhole) {
+  const FileId first = Say(Kind::kArrived, 7).at(0);
+  Say(Kind::kStream, 7, now_us_ + 100);
+  Say(Kind::kSorted, 7, now_us_ - 3600 * kSecondUs);
+  EXPECT_THAT(Say(Kind::kStream, 7, now_us_ + 50), ElementsAre(first)) << "no later than what it has";
+  EXPECT_NE(Say(Kind::kJudged, 7, now_us_ + 200).at(0), first);
+  Wait(3);
+  ASSERT_EQ(Closed(first).gaps.size(), 1u);
+  EXPECT_THAT(Closed(first).gaps[0].reason, HasSubstr("sorted before what had come of it"));
 }
 
 }  // namespace

@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-constexpr std::int64_t kUtime = 1'700'000'000'000'000;
+constexpr std::int64_t kUtime = 1'800'000'000'000'000;
 constexpr std::int64_t kBacklog = 1'000'000;
 
 class RecordingWriterTest : public ::testing::Test {
@@ -48,6 +48,12 @@ class RecordingWriterTest : public ::testing::Test {
     closed.part = part;
     closed.gaps = std::move(gaps);
     writer_.Close(file, Name(part), closed);
+  }
+  // Last changed at `utime`.
+  static void MakeFile(const fs::path& path, std::int64_t utime) {
+    const std::chrono::sys_time<std::chrono::microseconds> time{std::chrono::microseconds(utime)};
+    std::ofstream(path) << "old";
+    fs::last_write_time(path, std::chrono::file_clock::from_sys(time));
   }
   template <typename Report>
   std::vector<Report> Reports() {
@@ -81,7 +87,6 @@ TEST_F(RecordingWriterTest, WritesInOrderAndTellsWhenAFileIsOpenAndClosed) {
   ASSERT_EQ(closed.size(), 1u);
   EXPECT_TRUE(closed[0].part);
   EXPECT_EQ(closed[0].gaps, 0u);
-  EXPECT_EQ(closed[0].bytes, static_cast<std::int64_t>(fs::file_size(closed[0].path)));
   const auto recordings = ReadRecordings(base_);
   ASSERT_EQ(recordings.size(), 1u);
   ASSERT_EQ(recordings[0].events.size(), 4u);
@@ -137,9 +142,11 @@ TEST_F(RecordingWriterTest, AStationsFileThatIsGoneIsAGap) {
 }
 
 TEST_F(RecordingWriterTest, DeletesWhatTheRulesLetGoButNoOpenFileAndNothingElse) {
-  const std::int64_t now_us = kUtime + 40 * std::int64_t{86'400'000'000};
+  constexpr std::int64_t kDayUs = 86'400'000'000;
+  const std::int64_t now_us = kUtime + 40 * kDayUs;
   Open(1, 7);
-  std::ofstream(base_ / "parts" / NameOf({kUtime, 8, 2, true, true})) << "old";
+  MakeFile(base_ / "parts" / NameOf({kUtime, 8, 2, true, true}), kUtime);
+  MakeFile(base_ / "station" / NameOf({kUtime + kDayUs * 20, std::nullopt, 0, true, true}), kUtime);
   std::ofstream(base_ / "parts/notes.txt") << "somebody's";
   writer_.Prune(*store_, RetentionRules{}, now_us);
   const auto notes = Reports<WriterNote>();
@@ -148,6 +155,38 @@ TEST_F(RecordingWriterTest, DeletesWhatTheRulesLetGoButNoOpenFileAndNothingElse)
   EXPECT_THAT(notes[0].text, HasSubstr("part000008"));
   EXPECT_TRUE(fs::exists(base_ / "parts/notes.txt"));
   EXPECT_TRUE(fs::exists(store_->PathOf(Name(7)) + ".part"));
+}
+
+TEST_F(RecordingWriterTest, AClockInDoubtIsSaidOnce) {
+  constexpr std::int64_t kDayUs = 86'400'000'000;
+  MakeFile(base_ / "parts" / NameOf({kUtime, 8, 2, true, true}), kUtime);
+  writer_.Prune(*store_, RetentionRules{}, kUtime + 400 * kDayUs);
+  writer_.Prune(*store_, RetentionRules{}, kUtime + 400 * kDayUs);
+  const auto notes = Reports<WriterNote>();
+  ASSERT_EQ(notes.size(), 1u);
+  EXPECT_THAT(notes[0].text, HasSubstr("or the clock is wrong"));
+}
+
+TEST_F(RecordingWriterTest, ASecondRecorderOnTheFolderIsRefused) {
+  const auto second = RecordingStore::Open(base_.string());
+  ASSERT_FALSE(second.ok());
+  EXPECT_THAT(second.error().message, HasSubstr("another recorder"));
+  store_.reset();
+  EXPECT_TRUE(RecordingStore::Open(base_.string()).ok());
+}
+
+TEST_F(RecordingWriterTest, FreeSpaceIsThatOfTheDiskWithTheFiles) {
+  const auto free_bytes = [](const char* path) {
+    return static_cast<std::int64_t>(fs::space(path).available);
+  };
+  if (!fs::exists("/dev/shm") || free_bytes("/dev/shm") >= free_bytes(base_.c_str())) {
+    GTEST_SKIP() << "needs a second, smaller disk";
+  }
+  fs::remove(base_ / "parts");
+  fs::create_directory_symlink("/dev/shm", base_ / "parts");
+  const std::int64_t tolerance_bytes = 200'000'000;  // others write meanwhile
+  EXPECT_LE(*store_->FreeBytes(),
+            std::min(free_bytes("/dev/shm"), free_bytes(base_.c_str())) + tolerance_bytes);
 }
 
 TEST_F(RecordingWriterTest, AFolderThatIsGoneIsTold) {

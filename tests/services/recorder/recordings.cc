@@ -78,7 +78,7 @@ std::vector<Bytes> Recording::On(const std::string& channel) const {
 std::vector<Recording> ReadRecordings(const fs::path& folder) {
   std::vector<fs::path> paths;
   for (const auto& entry : fs::recursive_directory_iterator(folder)) {
-    if (entry.is_regular_file()) {
+    if (entry.is_regular_file() && entry.path().filename() != "recorder.lock") {
       paths.push_back(entry.path());
     }
   }

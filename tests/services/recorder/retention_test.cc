@@ -14,7 +14,7 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using Verdict = fsmsg::verdict_t;
 
-constexpr std::int64_t kDayUs = 86'400'000'000, kNowUs = 20'000 * kDayUs;
+constexpr std::int64_t kDayUs = 86'400'000'000, kNowUs = 21'000 * kDayUs;
 constexpr std::int64_t kBytes = 1000;
 
 class RetentionTest : public ::testing::Test {
@@ -28,9 +28,16 @@ class RetentionTest : public ::testing::Test {
     files_.push_back({path, kBytes, false});
     return path;
   }
-  std::vector<std::string> Deleted() const {
+  // Of the station, so that there is no long pause.
+  std::string AddVolume(double age_days) {
+    const std::int64_t utime = kNowUs - static_cast<std::int64_t>(age_days * static_cast<double>(kDayUs));
+    files_.push_back({"/r/station/" + NameOf({utime, std::nullopt, 0, true, true}), kBytes, false});
+    return files_.back().path;
+  }
+  RetentionPlan Plan(const FreeSpace& free = {}) const { return PlanRetention(files_, rules_, free, kNowUs); }
+  std::vector<std::string> Deleted(const FreeSpace& free = {}) const {
     std::vector<std::string> paths;
-    for (const Deletion& deletion : PlanRetention(files_, rules_, kNowUs).deletions) {
+    for (const Deletion& deletion : Plan(free).deletions) {
       paths.push_back(deletion.path);
     }
     return paths;
@@ -67,14 +74,14 @@ TEST_F(RetentionTest, AfterTheirTimeAllGoButTheNewestOkParts) {
   const auto nth = Add(4, Verdict::VERDICT_OK, true, 31);
   Add(5, Verdict::VERDICT_OK, true, 31);
   Add(6, Verdict::VERDICT_OK, true, 31);
-  files_.push_back(
-      {"/r/station/" + NameOf({kNowUs - 31 * kDayUs, std::nullopt, 0, true, true}), kBytes, false});
-  EXPECT_THAT(Deleted(), ElementsAre(bad, files_.back().path, nth));
+  const auto volume = AddVolume(31);
+  AddVolume(15);
+  EXPECT_THAT(Deleted(), ElementsAre(bad, volume, nth));
 }
 
 TEST_F(RetentionTest, ExactlyAtTheEndOfItsTimeItStays) {
-  files_.push_back(
-      {"/r/station/" + NameOf({kNowUs - 30 * kDayUs, std::nullopt, 0, true, true}), kBytes, false});
+  AddVolume(30);
+  AddVolume(15);
   EXPECT_THAT(Deleted(), IsEmpty());
 }
 
@@ -93,13 +100,14 @@ TEST_F(RetentionTest, AQuotaThatCannotBeHeldIsSaid) {
   Add(6, Verdict::VERDICT_OK);
   files_.push_back({"/r/parts/" + NameOf({kNowUs, 7, 0, false, false}), kBytes, true});
   rules_.quota_bytes = kBytes;
-  const RetentionPlan plan = PlanRetention(files_, rules_, kNowUs);
+  const RetentionPlan plan = Plan();
   EXPECT_THAT(plan.deletions, IsEmpty());
   EXPECT_EQ(plan.bytes_over_quota, 2 * kBytes);
 }
 
 TEST_F(RetentionTest, AnOpenFileNeverGoesOneLeftBehindDoes) {
   const std::string old = "/r/parts/" + NameOf({kNowUs - 40 * kDayUs, 7, 0, false, false});
+  AddVolume(15);
   files_.push_back({old, kBytes, true});
   EXPECT_THAT(Deleted(), IsEmpty());
   files_.back().open = false;
@@ -109,20 +117,79 @@ TEST_F(RetentionTest, AnOpenFileNeverGoesOneLeftBehindDoes) {
 TEST_F(RetentionTest, FilesOfOthersAreLeftAlone) {
   files_ = {{"/r/parts/notes.txt", 1'000'000'000, false},
             {"/r/parts/20200101T000000.000000Z_part000001_OK.lcmlog.gz", 1'000'000'000, false}};
-  const RetentionPlan plan = PlanRetention(files_, rules_, kNowUs);
+  const RetentionPlan plan = Plan();
   EXPECT_THAT(plan.deletions, IsEmpty());
   EXPECT_EQ(plan.bytes_over_quota, 0);
 }
 
 TEST_F(RetentionTest, EveryDeletionHasItsReason) {
   Add(1, Verdict::VERDICT_NOT_OK, true, 31);
+  AddVolume(15);
   for (int part = 5; part <= 7; ++part) {
     Add(part, Verdict::VERDICT_OK);
   }
-  const auto plan = PlanRetention(files_, rules_, kNowUs);
+  const auto plan = Plan();
   ASSERT_EQ(plan.deletions.size(), 2u);
   EXPECT_THAT(plan.deletions[0].reason, HasSubstr("30 days"));
   EXPECT_THAT(plan.deletions[1].reason, HasSubstr("not one of the newest 2"));
+}
+
+TEST_F(RetentionTest, ARecordingUnderAClockNobodyHadSetIsOfUnknownAge) {
+  const std::int64_t year_2000_us = 946'684'800'000'000;
+  files_.push_back({"/r/parts/" + NameOf({year_2000_us, 7, Verdict::VERDICT_NOT_OK, true, true}), kBytes,
+                    false, year_2000_us + kDayUs});
+  AddVolume(45);
+  AddVolume(20);
+  EXPECT_THAT(Deleted(), ElementsAre(files_[1].path));
+}
+
+TEST_F(RetentionTest, TheLastChangeCountsWhenItIsLaterThanTheName) {
+  AddVolume(31);
+  AddVolume(15);
+  files_[0].changed_us = kNowUs - kDayUs;
+  EXPECT_THAT(Deleted(), IsEmpty());
+}
+
+TEST_F(RetentionTest, AClockThatIsTooFarAheadDeletesNothingByAgeAndItIsSaid) {
+  Add(1, Verdict::VERDICT_NOT_OK, true, 410);
+  AddVolume(400);
+  AddVolume(0.1);  // recorded with the wrong clock
+  files_.push_back({"/r/station/" + NameOf({kNowUs, std::nullopt, 0, false, false}), kBytes, true});
+  EXPECT_THAT(Deleted(), IsEmpty());
+  EXPECT_THAT(Plan().doubt, HasSubstr("399 days"));
+}
+
+TEST_F(RetentionTest, AfterARealPauseAgeCountsAgainAsSoonAsRecordingHasGoneOnForLongEnough) {
+  Add(1, Verdict::VERDICT_NOT_OK, true, 100);
+  AddVolume(29);
+  AddVolume(15);
+  EXPECT_THAT(Deleted(), IsEmpty());
+  AddVolume(30.5);
+  EXPECT_THAT(Deleted(), ElementsAre(files_[0].path, files_[3].path));
+  EXPECT_EQ(Plan().doubt, "");
+}
+
+TEST_F(RetentionTest, ALeftOverThatChangedToday) {
+  files_.push_back({"/r/parts/" + NameOf({kNowUs, 7, 0, false, false}), kBytes, false, kNowUs - kDayUs / 2});
+  rules_.quota_bytes = 1;
+  EXPECT_THAT(Deleted(), IsEmpty()) << "somebody may still be at it";
+  files_[0].changed_us = kNowUs - 2 * kDayUs;
+  EXPECT_EQ(Deleted().size(), 1u);
+}
+
+TEST_F(RetentionTest, ADiskWithTooLittleSpaceIsGivenSomeInTheOrderOfTheQuota) {
+  const auto bad = Add(1, Verdict::VERDICT_NOT_OK);
+  const auto nth = Add(4, Verdict::VERDICT_OK);
+  Add(5, Verdict::VERDICT_OK);
+  Add(6, Verdict::VERDICT_OK);
+  for (StoredRecording& file : files_) {
+    file.disk = 1;
+  }
+  AddVolume(10);  // on another disk
+  rules_.min_free_bytes = 5 * kBytes;
+  EXPECT_THAT(Deleted({{0, 5 * kBytes}, {1, 5 * kBytes}}), IsEmpty());
+  EXPECT_THAT(Deleted({{0, 5 * kBytes}, {1, 4 * kBytes}}), ElementsAre(nth));
+  EXPECT_THAT(Deleted({{0, 5 * kBytes}, {1, 0}}), ElementsAre(nth, bad)) << "the newest OK parts stay";
 }
 
 }  // namespace

@@ -1,20 +1,9 @@
-// forgescan log as a user or a script calls it.
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-#include <sys/wait.h>
-#include <unistd.h>
+// Looking into recordings, checking, repairing and cutting them.
+#include "tests/tools/forgescan/log_cli.h"
 
-#include <array>
-#include <cstdio>
-#include <filesystem>
-#include <fstream>
 #include <nlohmann/json.hpp>
-#include <opencv2/imgcodecs.hpp>
 
-#include "services/common/geometry/cloud_io.h"
-#include "services/common/log/log_reader.h"
 #include "tests/common/real_data.h"
-#include "tests/tools/forgescan/test_recording.h"
 
 namespace forgescan {
 namespace {
@@ -22,65 +11,6 @@ namespace {
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 using Json = nlohmann::json;
-
-struct Output {
-  int exit_code = -1;
-  std::string text;  // standard output and error
-};
-
-class LogCli : public ::testing::Test {
- protected:
-  void SetUp() override { fs::create_directories(folder_); }
-  void TearDown() override { fs::remove_all(folder_); }
-
-  Output Call(const std::string& arguments) const {
-    Output output;
-    const std::string command =
-        "cd " + folder_.string() + " && " + FORGESCAN_BIN_DIR + "/forgescan log 2>&1 " + arguments;
-    FILE* pipe = popen(command.c_str(), "r");
-    std::array<char, 4096> buffer{};
-    while (std::fgets(buffer.data(), buffer.size(), pipe) != nullptr) {
-      output.text += buffer.data();
-    }
-    output.exit_code = WEXITSTATUS(pclose(pipe));
-    return output;
-  }
-  std::string Path(const std::string& name) const { return folder_ / name; }
-  void Write(const TestRecording& recording, const std::string& name = "a.log") const {
-    fs::remove(folder_ / name);
-    recording.WriteTo(Path(name));
-  }
-  // Changes bytes of the file.
-  void Patch(std::uint64_t at, const std::string& bytes) const {
-    std::fstream file(folder_ / "a.log", std::ios::binary | std::ios::in | std::ios::out);
-    file.seekp(static_cast<std::streamoff>(at));
-    file << bytes;
-  }
-  void ExpectFinding(const std::string& what) const {
-    const Output output = Call("check a.log");
-    EXPECT_EQ(output.exit_code, 1) << output.text;
-    EXPECT_THAT(output.text, HasSubstr(what));
-  }
-  std::vector<std::string> Channels(const std::string& name) const {
-    const auto log = LogReader::Open(Path(name));
-    EXPECT_TRUE(log.ok());
-    std::vector<std::string> channels;
-    for (const LogEntry& entry : log.ok() ? log->entries() : std::vector<LogEntry>()) {
-      channels.push_back(log->ChannelOf(entry));
-    }
-    return channels;
-  }
-  std::vector<std::string> Files(const std::string& folder) const {
-    std::vector<std::string> names;
-    for (const auto& entry : fs::directory_iterator(folder_ / folder)) {
-      names.push_back(entry.path().filename());
-    }
-    std::sort(names.begin(), names.end());
-    return names;
-  }
-
-  const fs::path folder_ = fs::path(::testing::TempDir()) / ("log_cli_" + std::to_string(getpid()));
-};
 
 TEST_F(LogCli, InfoStartsWithWhatARecordingHolds) {
   Write(TestRecording::Make());
@@ -257,6 +187,83 @@ TEST_F(LogCli, RepairKeepsWhatIsUndamagedAndSaysWhatIsNot) {
   EXPECT_NE(Call("repair a.log --out a.log").exit_code, 0);
 }
 
+// What a recorder that died has left, under the name it would have got.
+TEST_F(LogCli, RepairGivesALeftOverItsName) {
+  TestRecording recording = TestRecording::Make();
+  recording.events.pop_back();
+  Write(recording);
+  fs::rename(Path("a.log"), Path("b.log.part"));
+  const Output output = Call("repair b.log.part --out b.log");
+  ASSERT_EQ(output.exit_code, 0) << output.text;
+  EXPECT_EQ(Files("."), (std::vector<std::string>{"b.log", "b.log.part"}));
+  const Output check = Call("check b.log");
+  EXPECT_THAT(check.text, HasSubstr("b.log.part has no closing event"));
+  EXPECT_EQ(check.text.find("VERDICT"), std::string::npos) << check.text;
+}
+
+TEST_F(LogCli, WhatARepairLeftOutIsNamedOnceAChannelWithACount) {
+  TestRecording recording = TestRecording::Make();
+  recording.events.pop_back();
+  for (std::size_t i = 0; i < 20'000; ++i) {
+    recording.events.push_back(
+        {"SERVICE_STATE", recording.Now(), recording.events[recording.Find("SERVICE_STATE")].message});
+    recording.events.back().message.resize(20 + i % 10);
+    recording.events.push_back({"SHORT", recording.Now(), Bytes(i % 8)});
+  }
+  Write(recording);
+  ASSERT_EQ(Call("repair a.log --out b.log").exit_code, 0);
+  const auto channels = Channels("b.log");
+  EXPECT_EQ(std::count(channels.begin(), channels.end(), "SHORT"), 0);
+  const Output check = Call("check b.log");
+  EXPECT_THAT(check.text,
+              HasSubstr("SERVICE_STATE: the closing event names a gap: 20000 messages were left out: they "
+                        "do not decode as fsmsg.service_state_t"));
+  EXPECT_THAT(
+      check.text,
+      HasSubstr("SHORT: the closing event names a gap: 20000 messages were left out: they are no LCM"));
+  EXPECT_THAT(check.text, HasSubstr("3 findings in 1 of 1 logs"));
+}
+
+TEST_F(LogCli, InfoAndCheckGoOnAfterALogThatCannotBeRead) {
+  Write(TestRecording::Make());
+  const Output text = Call("info a.log nothing.log a.log");
+  EXPECT_EQ(text.exit_code, 1);
+  EXPECT_THAT(text.text, HasSubstr("nothing.log: No such file"));
+  const std::size_t first = text.text.find("recording of part 7");
+  EXPECT_NE(text.text.find("recording of part 7", first + 1), std::string::npos) << text.text;
+  const Output json = Call("info --json nothing.log a.log none.log 2>/dev/null");
+  EXPECT_EQ(json.exit_code, 1);
+  EXPECT_EQ(Json::parse(json.text).size(), 1u);
+}
+
+TEST_F(LogCli, WhatALogSaysDoesNotReachTheTerminalRaw) {
+  TestRecording recording = TestRecording::Make();
+  recording.events.pop_back();
+  fsmsg::recording_gap_t gap{};
+  gap.channel = "A";
+  gap.reason = "gone\n\x1B[2Ja.log: whole and complete \xC3\xB6\xFF\xC2\x9B";
+  recording.Close({gap});
+  Write(recording);
+  for (const char* command : {"info a.log", "check a.log"}) {
+    const Output output = Call(command);
+    EXPECT_THAT(output.text, HasSubstr("gone\\x0A\\x1B[2Ja.log: whole and complete \xC3\xB6\\xFF\\xC2\\x9B"))
+        << command;
+  }
+}
+
+TEST_F(LogCli, AReaderThatGoesAwayLeavesNoHalfLog) {
+  TestRecording recording = TestRecording::Make();
+  recording.events.pop_back();
+  for (int i = 0; i < 5000; ++i) {  // more to say than a pipe holds
+    recording.events.push_back({"SHORT", recording.Now(), Bytes(5)});
+  }
+  Write(recording);
+  const std::string log = std::string(FORGESCAN_BIN_DIR) + "/forgescan log ";
+  std::system(
+      ("cd " + folder_.string() + " && (" + log + "repair a.log --out b.log | true) 2>/dev/null").c_str());
+  EXPECT_EQ(Files("."), std::vector<std::string>{"a.log"}) << "what it had written is gone";
+}
+
 TEST_F(LogCli, CutTakesWhatIsAskedFor) {
   Write(TestRecording::Make());
   ASSERT_EQ(Call("cut a.log --out view.log --view 1").exit_code, 0);
@@ -281,6 +288,10 @@ TEST_F(LogCli, CutRefusesWhatItCannotDo) {
       {"--to +", "\"+\" is no time"},
       {"--to +nan", "is no time"},
       {"--from 12x", "is no time"},
+      {"--from ''", "is no time"},
+      {"--from +-1", "is no time"},
+      {"--from +0x1", "is no time"},
+      {"--from ' 1'", "is no time"},
       {"--channel '('", "is no regular expression"},
       {"--part 8", "none of its 16 events"},
       {"--from +100", "none of its 16 events"}};
@@ -290,63 +301,6 @@ TEST_F(LogCli, CutRefusesWhatItCannotDo) {
     EXPECT_THAT(output.text, HasSubstr(sentence));
   }
   EXPECT_EQ(Files("."), std::vector<std::string>{"a.log"});
-}
-
-TEST_F(LogCli, ExportMakesFilesOfEverything) {
-  const TestRecording recording = TestRecording::Make();
-  Write(recording);
-  const Output output = Call("export a.log --out b/");
-  ASSERT_EQ(output.exit_code, 0) << output.text;
-  EXPECT_EQ(Files("b"),
-            (std::vector<std::string>{"7_0_0_left_1.png", "7_0_0_right_1.png", "7_1_0_left_2.png",
-                                      "7_1_0_right_2.png", "7_2_0_left_3.png", "7_2_0_right_3.png",
-                                      "RECORDED_FILE.jsonl", "RECORDING_CLOSED.jsonl",
-                                      "RECORDING_OPENED.jsonl", "SERVICE_STATE.jsonl", "VERDICT.jsonl",
-                                      "VIEW_CLOUD_7_0.ply", "VIEW_CLOUD_7_1.ply", "VIEW_CLOUD_7_2.ply"}));
-  const cv::Mat image = cv::imread(folder_ / "b/7_1_0_right_2.png", cv::IMREAD_UNCHANGED);
-  const auto frame = Decode<fsmsg::frame_t>(recording.events[recording.Find("FRAME_RIGHT", 1)].message);
-  ASSERT_EQ(image.type(), CV_8UC1);
-  ASSERT_EQ(image.total(), frame->data.size());
-  EXPECT_TRUE(std::equal(frame->data.begin(), frame->data.end(), image.data));
-  const auto cloud = ReadPointCloud(folder_ / "b/VIEW_CLOUD_7_2.ply");
-  ASSERT_TRUE(cloud.ok());
-  EXPECT_EQ(cloud->points.size(), 5u);
-  EXPECT_EQ(cloud->points[4], Eigen::Vector3f(4, 2, 1000));
-  std::ifstream lines(folder_ / "b/SERVICE_STATE.jsonl");
-  int states = 0;
-  for (std::string line; std::getline(lines, line); ++states) {
-    EXPECT_EQ(Json::parse(line)["message"]["name"], "camera_left");
-  }
-  EXPECT_EQ(states, 3);
-  std::ifstream file(folder_ / "b/RECORDED_FILE.jsonl");
-  EXPECT_EQ(Json::parse(file)["message"]["data"], "YSA9IDE=");  // a = 1
-  ASSERT_EQ(Call("export a.log --out clouds --clouds").exit_code, 0);
-  EXPECT_EQ(Files("clouds").size(), 3u);
-}
-
-TEST_F(LogCli, ExportSaysWhatItHadToLeaveOut) {
-  TestRecording recording = TestRecording::Make();
-  recording.events[recording.Find("VIEW_CLOUD", 1)].message.back() ^= 1;
-  Write(recording);
-  const Output output = Call("export a.log --out b");
-  EXPECT_EQ(output.exit_code, 1);
-  EXPECT_THAT(output.text, HasSubstr("VIEW_CLOUD: a message of"));
-  EXPECT_THAT(output.text, HasSubstr("left out: 1 messages or clouds, 0 damaged stretches"));
-  EXPECT_EQ(Files("b").size(), 13u);
-  EXPECT_THAT(Call("export a.log --out b").text, HasSubstr("b: exists already"));
-  EXPECT_THAT(Call("export a.log").text, HasSubstr("needs --out FOLDER, --mcap FILE or both"));
-  EXPECT_NE(Call("export a.log --out nowhere/b").exit_code, 0);
-  EXPECT_NE(Call("export nothing.log --out c").exit_code, 0);
-  EXPECT_EQ(Files("."), (std::vector<std::string>{"a.log", "b"}));
-}
-
-TEST_F(LogCli, ExportsToMcap) {
-  Write(TestRecording::Make());
-  const Output output = Call("export a.log --mcap b.mcap");
-  ASSERT_EQ(output.exit_code, 0) << output.text;
-  EXPECT_EQ(output.text, "b.mcap: 16 messages\n");
-  EXPECT_THAT(Call("export a.log --mcap b.mcap").text, HasSubstr("b.mcap: exists already"));
-  EXPECT_EQ(Files("."), (std::vector<std::string>{"a.log", "b.mcap"}));
 }
 
 }  // namespace

@@ -89,8 +89,7 @@ class LogRepair : public ::testing::TestWithParam<Kind> {
     std::vector<Bytes> messages;
     for (const LogEntry& entry : whole.entries()) {
       const auto begin = whole_.begin() + static_cast<std::ptrdiff_t>(entry.offset);
-      const auto end =
-          begin + static_cast<std::ptrdiff_t>(kLogHeaderBytes + whole.ChannelOf(entry).size() + entry.bytes);
+      const auto end = begin + static_cast<std::ptrdiff_t>(whole.EndOf(entry) - entry.offset);
       if (whole.ChannelOf(entry) != kRecordingClosed.name &&
           std::search(file.begin(), file.end(), begin, end) != file.end()) {
         messages.push_back(*whole.Read(entry));
@@ -111,9 +110,7 @@ TEST_P(LogRepair, KeepsEveryUndamagedEvent) {
     Random random(seed);
     const LogEntry& entry = whole->entries()[1 + random() % (whole->entries().size() - 2)];
     Bytes file = whole_;
-    GetParam().damage(
-        file, {entry.offset, entry.offset + kLogHeaderBytes + whole->ChannelOf(entry).size() + entry.bytes},
-        random);
+    GetParam().damage(file, {entry.offset, whole->EndOf(entry)}, random);
     if (file == whole_) continue;
     std::ofstream(folder_ / "a.log", std::ios::binary | std::ios::trunc)
         .write(reinterpret_cast<const char*>(file.data()), static_cast<std::streamsize>(file.size()));

@@ -11,6 +11,7 @@
 
 #include "services/common/base64.h"
 #include "services/common/bus/bus.h"
+#include "services/common/new_file.h"
 
 namespace forgescan {
 namespace {
@@ -48,7 +49,20 @@ class McapWriterTest : public ::testing::Test {
  protected:
   void TearDown() override {
     fs::remove(path_);
-    fs::remove(path_ + ".part");
+    fs::remove(path_ + StagedEnding());
+  }
+  // On two channels, in two chunks.
+  void WriteFourMessages() const {
+    auto writer = McapWriter::Create(path_);
+    ASSERT_TRUE(writer.ok()) << writer.error().message;
+    const auto schema = writer->AddSchema("type", R"({"type":"object"})");
+    const auto a = writer->AddChannel(*schema, "A"), b = writer->AddChannel(*schema, "B");
+    ASSERT_TRUE(a.ok() && b.ok());
+    const std::string large(3'000'000, ' ');
+    for (std::uint32_t i = 0; i < 4; ++i) {
+      ASSERT_TRUE(writer->Write({i % 2 == 0 ? *a : *b, i, 1000 - i, i}, "{}" + large).ok());
+    }
+    ASSERT_TRUE(writer->Close().ok());
   }
   std::string FileBytes() const {
     std::ifstream file(path_, std::ios::binary);
@@ -59,16 +73,7 @@ class McapWriterTest : public ::testing::Test {
 
 // Read back by the letter of the specification.
 TEST_F(McapWriterTest, StartsAndFollowsTheSpecification) {
-  auto writer = McapWriter::Create(path_);
-  ASSERT_TRUE(writer.ok()) << writer.error().message;
-  const auto schema = writer->AddSchema("type", R"({"type":"object"})");
-  const auto a = writer->AddChannel(*schema, "A"), b = writer->AddChannel(*schema, "B");
-  ASSERT_TRUE(a.ok() && b.ok());
-  const std::string large(3'000'000, ' ');
-  for (std::uint32_t i = 0; i < 4; ++i) {  // two chunks
-    ASSERT_TRUE(writer->Write({i % 2 == 0 ? *a : *b, i, 1000 - i, i}, "{}" + large).ok());
-  }
-  ASSERT_TRUE(writer->Close().ok());
+  WriteFourMessages();
   const std::string bytes = FileBytes(), magic("\x89MCAP0\r\n", 8);
   ASSERT_EQ(bytes.substr(0, 8), magic);
   ASSERT_EQ(bytes.substr(bytes.size() - 8), magic);
@@ -101,6 +106,38 @@ TEST_F(McapWriterTest, StartsAndFollowsTheSpecification) {
   }
 }
 
+// What a viewer jumps by: summary offset to chunk index, to message index, to message.
+TEST_F(McapWriterTest, IndicesLeadToTheMessages) {
+  WriteFourMessages();
+  const std::string bytes = FileBytes();
+  std::map<std::uint64_t, std::uint64_t> channels;  // by log time
+  for (const Record& summary : Records(bytes, 8, bytes.size() - 8)) {
+    if (summary.op != 14) continue;
+    const std::uint64_t group = Number(summary.content, 0, 1), at = Number(summary.content, 1, 8);
+    for (const Record& record : Records(bytes, at, at + Number(summary.content, 9, 8))) {
+      EXPECT_EQ(record.op, static_cast<int>(group));
+      if (record.op != 8) continue;
+      const std::uint64_t messages = Number(record.content, 16, 8) + 9 + 40;  // behind the chunk's head
+      constexpr std::size_t kMap = 36, kMapEntry = 10, kIndexEntry = 16;
+      for (std::size_t entry = kMap; entry < kMap + Number(record.content, 32, 4); entry += kMapEntry) {
+        const std::uint64_t channel = Number(record.content, entry, 2),
+                            index = Number(record.content, entry + 2, 8);
+        ASSERT_EQ(bytes.at(index), 7);
+        EXPECT_EQ(Number(bytes, index + 9, 2), channel);
+        for (std::size_t i = 0; i < Number(bytes, index + 11, 4); i += kIndexEntry) {
+          const std::uint64_t time_ns = Number(bytes, index + 15 + i, 8),
+                              message = messages + Number(bytes, index + 23 + i, 8);
+          ASSERT_EQ(bytes.at(message), 5);
+          EXPECT_EQ(Number(bytes, message + 9, 2), channel);
+          EXPECT_EQ(Number(bytes, message + 15, 8), time_ns);
+          channels[time_ns] = channel;
+        }
+      }
+    }
+  }
+  EXPECT_EQ(channels, (std::map<std::uint64_t, std::uint64_t>{{997, 2}, {998, 1}, {999, 2}, {1000, 1}}));
+}
+
 TEST_F(McapWriterTest, AnEmptyFileIsValid) {
   auto writer = McapWriter::Create(path_);
   ASSERT_TRUE(writer.ok());
@@ -116,7 +153,7 @@ TEST_F(McapWriterTest, NeverOverwritesAndLeavesNothingHalf) {
     ASSERT_TRUE(writer.ok());
     EXPECT_FALSE(McapWriter::Create(path_).ok());  // it is being written
   }
-  EXPECT_FALSE(fs::exists(path_ + ".part"));
+  EXPECT_FALSE(fs::exists(path_ + StagedEnding()));
   std::ofstream(path_) << "mine";
   const auto refused = McapWriter::Create(path_);
   ASSERT_FALSE(refused.ok());

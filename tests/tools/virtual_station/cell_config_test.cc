@@ -48,6 +48,16 @@ TEST(CellConfig, SmallerImagesSeeTheSameField) {
   EXPECT_LT((corner_full - corner_quarter).norm(), 1e-10);  // slope: rounding
 }
 
+TEST(CellConfig, EverySizeIsOneThatVirtualCamerasHave) {
+  for (const int divisor : {1, 2, 4, 8}) {
+    const auto config = LoadCellConfig(kCell, divisor);
+    ASSERT_TRUE(config.ok()) << config.error().message;
+    EXPECT_EQ(config->rig.left.width_px % 4, 0) << divisor;
+    EXPECT_EQ(config->rig.left.height_px % 4, 0) << divisor;
+    EXPECT_EQ(config->rig.left.width_px / 4, 2448 / divisor / 4) << divisor;
+  }
+}
+
 TEST(CellConfig, OddPartsAreOptionalAndOfTheAxle) {
   const auto none =
       LoadChanged("[[odd_part]]\npart = 6\ndimension = \"total_length\"\nsize_mm = 1886.6\n", "");

@@ -27,7 +27,7 @@ void CheckNumbers(const LogReader& log, std::vector<LogFinding>& findings) {
                           last < 0 ? fmt::format("the first event has the number {}, not 0", entry.number)
                                    : fmt::format("event {} follows event {}", entry.number, last)});
     }
-    end = entry.offset + kLogHeaderBytes + log.ChannelOf(entry).size() + entry.bytes;
+    end = log.EndOf(entry);
     last = entry.number;
   }
 }

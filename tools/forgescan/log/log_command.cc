@@ -1,4 +1,5 @@
 // forgescan log: what is in a recording, whether it is whole, and what can be made of it.
+#include <csignal>
 #include <cstdio>
 #include <memory>
 
@@ -9,6 +10,7 @@
 #include "tools/forgescan/log/log_info.h"
 #include "tools/forgescan/log/log_repair.h"
 #include "tools/forgescan/log/mcap_export.h"
+#include "tools/forgescan/log/shown_text.h"
 
 namespace forgescan {
 namespace {
@@ -20,21 +22,35 @@ struct InfoArguments {
   bool json = false;
 };
 
+Result<Json> InfoOfOne(const std::string& file) {
+  ASSIGN_OR_RETURN(const Recording recording, OpenRecording(file));
+  return LogInfo(recording);
+}
+
+// Every log that can be read is shown, whatever the others are.
 Status Info(const InfoArguments& arguments) {
   Json all = Json::array();
+  std::vector<Error> errors;
   for (const std::string& file : arguments.files) {
-    ASSIGN_OR_RETURN(const Recording recording, OpenRecording(file));
-    ASSIGN_OR_RETURN(Json info, LogInfo(recording));
-    if (arguments.json) {
-      all.push_back(std::move(info));
+    auto info = InfoOfOne(file);
+    if (!info.ok()) {
+      errors.push_back(info.error());
+    } else if (arguments.json) {
+      all.push_back(std::move(*info));
     } else {
-      std::fputs(LogInfoText(info).c_str(), stdout);
+      std::fputs(LogInfoText(*info).c_str(), stdout);
     }
   }
   if (arguments.json) {
     std::printf("%s\n", all.dump(2, ' ', false, Json::error_handler_t::replace).c_str());
   }
-  return {};
+  if (errors.size() <= 1) {
+    return errors.empty() ? Status() : Status(errors.front());
+  }
+  for (const Error& error : errors) {
+    fmt::print(stderr, "{}\n", error.message);
+  }
+  return Fail(errors.front().code, "{} of {} logs cannot be read", errors.size(), arguments.files.size());
 }
 
 // The number of findings, each said in a line.
@@ -44,7 +60,7 @@ Result<std::size_t> CheckOne(const std::string& file) {
   for (const LogFinding& finding : findings) {
     const std::string place = finding.offset ? fmt::format("byte {}: ", *finding.offset) : "";
     const std::string channel = finding.channel.empty() ? "" : finding.channel + ": ";
-    fmt::print("{}: {}{}{}\n", file, place, channel, finding.what);
+    fmt::print("{}: {}{}\n", file, place, Shown(channel + finding.what));
   }
   if (findings.empty()) {
     fmt::print("{}: whole and complete, {} events\n", file, recording.log.entries().size());
@@ -84,11 +100,18 @@ void AddCheck(CLI::App& log, Status& outcome) {
   command->callback([files, &outcome] { outcome = Check(*files); });
 }
 
+// For commands that make files: a reader of their words that goes away (| head) is an error like any other,
+// after which nothing half is left behind.
+void FailWithoutReader(CLI::App& command) {
+  command.preparse_callback([](std::size_t) { std::signal(SIGPIPE, SIG_IGN); });
+}
+
 void AddRepair(CLI::App& log, Status& outcome) {
   auto arguments = std::make_shared<std::pair<std::string, std::string>>();
   CLI::App* command = log.add_subcommand("repair", "Write the undamaged events of a log to a new one");
   command->add_option("file", arguments->first, "LCM log")->required();
   command->add_option("--out", arguments->second, "the new log; must not exist")->required();
+  FailWithoutReader(*command);
   command->callback([arguments, &outcome] { outcome = RepairLog(arguments->first, arguments->second); });
 }
 
@@ -104,7 +127,16 @@ void AddCut(CLI::App& log, Status& outcome) {
                       "regular expressions; a channel matches one of them as a whole");
   command->add_option("--part", cut->part, "only messages that name this part");
   command->add_option("--view", cut->view, "only messages that name this view");
+  FailWithoutReader(*command);
   command->callback([cut, &outcome] { outcome = CutLog(*cut); });
+}
+
+// What is wrong with either; the same sentence once.
+Status Both(const Status& one, const Status& other) {
+  if (one.ok() || other.ok() || one.error().message == other.error().message) {
+    return one.ok() ? other : one;
+  }
+  return Fail(one.error().code, "{}; {}", one.error().message, other.error().message);
 }
 
 void AddExport(CLI::App& log, Status& outcome) {
@@ -123,6 +155,7 @@ void AddExport(CLI::App& log, Status& outcome) {
     command->add_flag(name, *flag, "only these (several may be given)")->needs(out);
   }
   command->add_option("--mcap", arguments->mcap, "everything as one MCAP file, for Foxglove; must not exist");
+  FailWithoutReader(*command);
   command->callback([arguments, &outcome] {
     if (arguments->what.folder.empty() && arguments->mcap.empty()) {
       outcome = Fail(ErrorCode::kInvalidArgument, "log export needs --out FOLDER, --mcap FILE or both");
@@ -131,8 +164,8 @@ void AddExport(CLI::App& log, Status& outcome) {
     if (!arguments->what.folder.empty()) {
       outcome = ExportLog(arguments->file, arguments->what);
     }
-    if (outcome.ok() && !arguments->mcap.empty()) {
-      outcome = ExportMcap(arguments->file, arguments->mcap);
+    if (!arguments->mcap.empty()) {
+      outcome = Both(outcome, ExportMcap(arguments->file, arguments->mcap));
     }
   });
 }

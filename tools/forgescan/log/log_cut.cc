@@ -1,6 +1,7 @@
 #include "tools/forgescan/log/log_cut.h"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <filesystem>
 #include <regex>
@@ -19,25 +20,28 @@ struct Selection {
   std::optional<int> part, view;
 };
 
+// The whole text is one number without spaces.
+template <typename Number>
+std::optional<Number> NumberIn(std::string_view text) {
+  Number value{};
+  const auto [end, problem] = std::from_chars(text.data(), text.data() + text.size(), value);
+  return problem == std::errc() && end == text.data() + text.size() ? std::optional(value) : std::nullopt;
+}
+
 Result<std::int64_t> ParseTime(const std::string& text, std::int64_t begin_us) {
-  const bool is_relative = text.starts_with('+');
-  std::size_t used = 0;
-  std::int64_t utime = 0;
-  try {
-    if (is_relative) {
-      const double us = std::stod(text.substr(1), &used) * 1e6;
-      used = std::abs(us) < 1e17 ? used + 1 : 0;  // false for NaN too
-      used = used == 0 || __builtin_add_overflow(begin_us, std::llround(us), &utime) ? 0 : used;
-    } else {
-      utime = std::stoll(text, &used);
+  constexpr double kMaxSeconds = 1e11;
+  if (!text.starts_with('+')) {
+    if (const auto utime = NumberIn<std::int64_t>(text)) {
+      return *utime;
     }
-  } catch (const std::exception&) {
-    used = 0;
+  } else if (const auto seconds = NumberIn<double>(std::string_view(text).substr(1));
+             seconds && !std::signbit(*seconds) && *seconds < kMaxSeconds) {
+    std::int64_t utime = 0;
+    if (!__builtin_add_overflow(begin_us, std::llround(*seconds * 1e6), &utime)) {
+      return utime;
+    }
   }
-  if (used != text.size()) {
-    return Fail(ErrorCode::kInvalidArgument, "\"{}\" is no time: us since 1970, or +SECONDS", text);
-  }
-  return utime;
+  return Fail(ErrorCode::kInvalidArgument, "\"{}\" is no time: us since 1970, or +SECONDS", text);
 }
 
 Result<Selection> Parse(const LogCut& cut, const LogReader& log) {
@@ -46,11 +50,11 @@ Result<Selection> Parse(const LogCut& cut, const LogReader& log) {
       std::min_element(log.entries().begin(), log.entries().end(), [](const auto& a, const auto& b) {
         return a.utime < b.utime;
       })->utime;
-  if (!cut.from.empty()) {
-    ASSIGN_OR_RETURN(selection.from_us, ParseTime(cut.from, begin_us));
+  if (cut.from) {
+    ASSIGN_OR_RETURN(selection.from_us, ParseTime(*cut.from, begin_us));
   }
-  if (!cut.to.empty()) {
-    ASSIGN_OR_RETURN(selection.to_us, ParseTime(cut.to, begin_us));
+  if (cut.to) {
+    ASSIGN_OR_RETURN(selection.to_us, ParseTime(*cut.to, begin_us));
   }
   for (const std::string& channel : cut.channels) {
     try {

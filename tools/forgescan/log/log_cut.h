@@ -11,9 +11,9 @@ namespace forgescan {
 
 struct LogCut {
   std::string file, out;
-  std::string from, to;               // us since 1970, or +SECONDS after the first event; empty = no limit
-  std::vector<std::string> channels;  // regular expressions; none = all channels
-  std::optional<int> part, view;      // messages with other numbers, or without any, are left out
+  std::optional<std::string> from, to;  // us since 1970, or +SECONDS after the first event; none = no limit
+  std::vector<std::string> channels;    // regular expressions; none = all channels
+  std::optional<int> part, view;        // messages with other numbers, or without any, are left out
 };
 
 // Copies the events that meet every condition, and always the opening event with the station's files. Errors:

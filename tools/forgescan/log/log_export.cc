@@ -2,11 +2,14 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cerrno>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <map>
 
 #include "services/common/geometry/cloud_io.h"
+#include "services/common/new_file.h"
 #include "services/common/output_file.h"
 #include "tools/forgescan/log/image_file.h"
 #include "tools/forgescan/log/log_visitor.h"
@@ -30,8 +33,7 @@ class Exporter final : public LogVisitor {
  public:
   explicit Exporter(fs::path folder) : folder_(std::move(folder)) {}
 
-  Status Image(const LogEvent& /*event*/, const fsmsg::frame_t& frame) override {
-    ASSIGN_OR_RETURN(const std::string png, EncodePng(frame));
+  Status Image(const LogEvent& /*event*/, const fsmsg::frame_t& frame, const std::string& png) override {
     const std::string name = fmt::format("{}_{}_{}_{}_{}", frame.part, frame.view, frame.attempt,
                                          CameraName(frame.camera), frame.pattern);
     ++images_;
@@ -56,11 +58,12 @@ class Exporter final : public LogVisitor {
   Status Flush() {
     for (auto& [channel, text] : lines_) {
       const fs::path path = folder_ / (FileName(channel) + ".jsonl");
+      errno = 0;
       std::ofstream file(path, std::ios::binary | std::ios::app);
       file.write(text.data(), static_cast<std::streamsize>(text.size()));
       file.close();
       if (!file) {
-        return Fail(ErrorCode::kIo, "{}: cannot be written", path.string());
+        return Fail(ErrorCode::kIo, "{}: cannot be written ({})", path.string(), std::strerror(errno));
       }
     }
     lines_.clear();
@@ -104,7 +107,7 @@ class NewFolder {
     if (fs::exists(fs::symlink_status(path, error))) {
       return Fail(ErrorCode::kInvalidArgument, "{}: exists already", path);
     }
-    const fs::path part = fs::path(path) += ".part";
+    const fs::path part = path + StagedEnding();
     if (!fs::create_directory(part, error)) {
       return Fail(ErrorCode::kIo, "{}: cannot be made: {}", part.string(),
                   error ? error.message() : "exists already");
@@ -122,11 +125,7 @@ class NewFolder {
   }
   const fs::path& part() const { return part_; }
   Status Finish() {
-    std::error_code error;
-    fs::rename(part_, path_, error);
-    if (error) {
-      return Fail(ErrorCode::kIo, "{}: cannot be put in place: {}", path_.string(), error.message());
-    }
+    RETURN_IF_ERROR(RenameToNew(part_, path_));
     part_.clear();
     return {};
   }

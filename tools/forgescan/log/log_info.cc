@@ -4,6 +4,7 @@
 #include <map>
 
 #include "services/common/bus/big_endian.h"
+#include "tools/forgescan/log/shown_text.h"
 
 namespace forgescan {
 namespace {
@@ -94,6 +95,8 @@ Json Closed(const fsmsg::recording_closed_t& closed) {
           {"gaps", std::move(gaps)}};
 }
 
+std::string ShownText(const Json& text) { return Shown(text.get<std::string>()); }
+
 std::string ChannelLine(const Json& channel, double begin_us) {
   const auto seconds = [begin_us](const Json& utime) { return (utime.get<double>() - begin_us) * 1e-6; };
   std::string types;
@@ -115,16 +118,16 @@ std::string RecordingLines(const Json& info) {
     text += fmt::format("  recording of {} at station {}, version {} ({}), configuration {}\n",
                         part < 0 ? fmt::format("the station, volume {}", opened["volume"].get<int>())
                                  : fmt::format("part {}", part),
-                        opened["station"].get<std::string>(), opened["version"].get<std::string>(),
-                        opened["build"].get<std::string>(), opened["config_hash"].get<std::string>());
+                        ShownText(opened["station"]), ShownText(opened["version"]),
+                        ShownText(opened["build"]), ShownText(opened["config_hash"]));
   }
   if (const Json& closed = info["closed"]; !closed.is_null()) {
-    text += fmt::format("  closed: {}; verdict {}; {} gaps\n", closed["reason"].get<std::string>(),
+    text += fmt::format("  closed: {}; verdict {}; {} gaps\n", ShownText(closed["reason"]),
                         closed["verdict"].get<std::string>(), closed["gaps"].size());
     for (const Json& gap : closed["gaps"]) {
-      const std::string channel = gap["channel"].get<std::string>();
-      text += fmt::format("    missing: {}{}{}\n", channel, channel.empty() ? "" : ": ",
-                          gap["text"].get<std::string>());
+      const std::string channel = ShownText(gap["channel"]);
+      text +=
+          fmt::format("    missing: {}{}{}\n", channel, channel.empty() ? "" : ": ", ShownText(gap["text"]));
     }
   } else if (!info["opened"].is_null()) {
     text += "  not closed: whoever recorded it did not come to the end\n";

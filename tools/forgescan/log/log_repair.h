@@ -7,9 +7,9 @@
 
 namespace forgescan {
 
-// Copies every undamaged event: not those whose stream CRC is wrong or that do not decode as their type; an
-// event of an unknown type cannot be judged and is copied. The old log is only read. Prints a line for each
-// thing left out. Errors: as LogReader::Open() and LogWriter.
+// Copies every undamaged event: not those whose stream CRC is wrong, that do not decode as their type, or
+// that are too short for a type; an event of an unknown type cannot be judged and is copied. The old log is
+// only read. Prints a line for each thing left out. Errors: as LogReader::Open() and LogWriter.
 Status RepairLog(const std::string& file, const std::string& out);
 
 }  // namespace forgescan

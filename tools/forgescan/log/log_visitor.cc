@@ -10,7 +10,9 @@
 #include "services/common/bus/codec.h"
 #include "services/common/bus/stream_header.h"
 #include "services/common/log/lcm_decode.h"
+#include "tools/forgescan/log/image_file.h"
 #include "tools/forgescan/log/progress.h"
+#include "tools/forgescan/log/shown_text.h"
 
 namespace forgescan {
 namespace {
@@ -72,7 +74,8 @@ class Visit {
       return Problem(event.channel, fmt::format("an image of {} x {} px has {} bytes", frame->width_px,
                                                 frame->height_px, frame->data.size()));
     }
-    return visitor_.Image(event, *frame);
+    const auto png = EncodePng(*frame);
+    return png.ok() ? visitor_.Image(event, *frame, *png) : Problem(event.channel, png.error().message);
   }
 
   Status HandSlice(const LogEvent& event, ByteView message) {
@@ -95,7 +98,7 @@ class Visit {
 
   void Say(const std::string& channel, const std::string& problem) {
     ++problems_;
-    fmt::print(stderr, "{}: byte {}: {}: {}\n", recording_.log.path(), offset_, channel, problem);
+    fmt::print(stderr, "{}: byte {}: {}: {}\n", recording_.log.path(), offset_, channel, Shown(problem));
   }
   // Ok: the visit goes on.
   Status Problem(const std::string& channel, const std::string& problem) {

@@ -20,7 +20,7 @@ struct LogEvent {
 class LogVisitor {
  public:
   virtual ~LogVisitor() = default;
-  virtual Status Image(const LogEvent& event, const fsmsg::frame_t& frame) = 0;
+  virtual Status Image(const LogEvent& event, const fsmsg::frame_t& frame, const std::string& png) = 0;
   // `slice` is the one that completed the cloud; it says which.
   virtual Status Cloud(const LogEvent& event, const fsmsg::cloud_slice_t& slice, const PointCloud& cloud) = 0;
   virtual Status Message(const LogEvent& event, const LcmStruct& type,
@@ -33,8 +33,9 @@ struct VisitedKinds {
   bool images = true, clouds = true, messages = true;
 };
 
-// Messages that are damaged, and clouds that lack slices, are named on standard error and counted: that is
-// the result. Memory: one message, and at most 8 clouds a channel. Errors: kIo, the visitor's.
+// Messages that are damaged, images that no PNG can hold, and clouds that lack slices, are named on standard
+// error and counted: that is the result. Memory: one message, and at most 8 clouds a channel. Errors: kIo,
+// the visitor's.
 Result<std::int64_t> VisitLog(const Recording& recording, VisitedKinds kinds, LogVisitor& visitor);
 
 // The outcome of an export after which `problems` things are missing. Errors: kUntrusted (some, or the log is

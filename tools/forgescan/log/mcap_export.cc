@@ -33,8 +33,7 @@ class McapVisitor final : public LogVisitor {
  public:
   McapVisitor(const LcmTypes& types, McapWriter& writer) : types_(types), writer_(writer) {}
 
-  Status Image(const LogEvent& event, const fsmsg::frame_t& frame) override {
-    ASSIGN_OR_RETURN(const std::string png, EncodePng(frame));
+  Status Image(const LogEvent& event, const fsmsg::frame_t& frame, const std::string& png) override {
     ASSIGN_OR_RETURN(const std::uint16_t channel, Channel(event, "foxglove.CompressedImage", ImageSchema));
     return Put(event, channel, frame.utime,
                ImageMessage(frame.utime, "camera_" + CameraName(frame.camera), png));

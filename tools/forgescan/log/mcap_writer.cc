@@ -4,9 +4,13 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
+#include <cstring>
 #include <filesystem>
 #include <system_error>
 #include <utility>
+
+#include "services/common/new_file.h"
 
 namespace forgescan {
 namespace {
@@ -75,16 +79,17 @@ std::string Joined(const std::vector<std::string>& records) {
 }  // namespace
 
 Result<McapWriter> McapWriter::Create(const std::string& path) {
-  const std::string part = path + ".part";
+  const std::string part = path + StagedEnding();
   std::error_code ignored;
   for (const std::string& name : {path, part}) {
     if (fs::exists(fs::symlink_status(name, ignored))) {
       return Fail(ErrorCode::kInvalidArgument, "{}: exists already", name);
     }
   }
+  errno = 0;
   std::ofstream file(part, std::ios::binary);
   if (!file) {
-    return Fail(ErrorCode::kIo, "{}: cannot be made", part);
+    return Fail(ErrorCode::kIo, "{}: cannot be made ({})", part, std::strerror(errno));
   }
   McapWriter writer(path, std::move(file));
   RETURN_IF_ERROR(writer.Put(kMagic));
@@ -113,14 +118,16 @@ McapWriter::McapWriter(McapWriter&& other) noexcept
 McapWriter::~McapWriter() {
   std::error_code ignored;
   if (is_open_) {
-    fs::remove(path_ + ".part", ignored);
+    fs::remove(path_ + StagedEnding(), ignored);
   }
 }
 
 Status McapWriter::Put(std::string_view bytes) {
+  errno = 0;
   file_.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
   if (!file_) {
-    return Fail(ErrorCode::kIo, "{}.part: cannot be written at byte {}", path_, position_);
+    return Fail(ErrorCode::kIo, "{}: cannot be written at byte {} ({})", path_, position_,
+                std::strerror(errno));
   }
   position_ += bytes.size();
   crc_ = Crc(crc_, bytes);
@@ -237,15 +244,12 @@ Status McapWriter::Close() {
   RETURN_IF_ERROR(FlushChunk());
   RETURN_IF_ERROR(Put(Record(Op::kDataEnd, Content().Put(crc_))));
   RETURN_IF_ERROR(PutSummary());
+  errno = 0;
   file_.close();
-  std::error_code error;
-  if (!file_ || fs::exists(path_, error)) {
-    return Fail(ErrorCode::kIo, "{}: cannot be written, or was made meanwhile by another", path_);
+  if (!file_) {
+    return Fail(ErrorCode::kIo, "{}: cannot be written ({})", path_, std::strerror(errno));
   }
-  fs::rename(path_ + ".part", path_, error);
-  if (error) {
-    return Fail(ErrorCode::kIo, "{}: cannot be put in place: {}", path_, error.message());
-  }
+  RETURN_IF_ERROR(RenameToNew(path_ + StagedEnding(), path_));
   is_open_ = false;
   return {};
 }

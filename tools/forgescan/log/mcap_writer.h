@@ -15,7 +15,7 @@ namespace forgescan {
 
 class McapWriter {
  public:
-  // The file is PATH.part until it is closed. Errors: kInvalidArgument (PATH or PATH.part exists), kIo.
+  // The file has StagedEnding() until it is closed. Errors: kInvalidArgument (either exists), kIo.
   static Result<McapWriter> Create(const std::string& path);
   McapWriter(McapWriter&& other) noexcept;
   McapWriter& operator=(McapWriter&&) = delete;

@@ -6,13 +6,22 @@
 #include "fsmsg/verdict_t.hpp"
 #include "services/common/bus/channels.h"
 #include "services/common/bus/codec.h"
+#include "services/common/new_file.h"
+#include "services/recorder/gaps.h"
 
 namespace forgescan {
 
 namespace fs = std::filesystem;
 
+namespace {
+
+// So that the closing event fits into a log, whatever the source says.
+constexpr std::size_t kMaxGaps = 10'000, kMaxReasonBytes = 1000;
+
+}  // namespace
+
 Result<NewLog> NewLog::Create(const Recording& source, const std::string& path) {
-  ASSIGN_OR_RETURN(LogWriter writer, LogWriter::Create(path));
+  ASSIGN_OR_RETURN(LogWriter writer, LogWriter::Create(path, StagedEnding()));
   return NewLog(source, std::move(writer));
 }
 
@@ -32,6 +41,7 @@ NewLog::NewLog(NewLog&& other) noexcept
     : source_(other.source_),
       writer_(std::move(other.writer_)),
       totals_(std::move(other.totals_)),
+      verdicts_(std::move(other.verdicts_)),
       gaps_(std::move(other.gaps_)),
       last_utime_(other.last_utime_),
       is_open_(std::exchange(other.is_open_, false)) {}
@@ -39,7 +49,7 @@ NewLog::NewLog(NewLog&& other) noexcept
 NewLog::~NewLog() {
   std::error_code ignored;
   if (is_open_) {
-    fs::remove(writer_.path() + ".part", ignored);
+    fs::remove(writer_.open_path(), ignored);
   }
 }
 
@@ -47,14 +57,17 @@ Status NewLog::Copy(const LogEntry& entry, ByteView message) {
   const std::string& channel = source_.log.ChannelOf(entry);
   totals_.Add(channel, message);
   last_utime_ = entry.utime;
+  if (channel == kVerdict.name) {
+    const auto verdict = Decode<fsmsg::verdict_t>(message);
+    if (verdict.ok()) {
+      verdicts_[verdict->part] = verdict->verdict;
+    }
+  }
   return writer_.Write(channel, entry.utime, message);
 }
 
 void NewLog::AddGap(const std::string& channel, const std::string& reason) {
-  fsmsg::recording_gap_t gap{};
-  gap.channel = channel;
-  gap.reason = reason;
-  gaps_.push_back(gap);
+  gaps_.push_back(GapOf(channel, reason));
 }
 
 void NewLog::AddChangedChannels() {
@@ -69,16 +82,32 @@ void NewLog::AddChangedChannels() {
   }
 }
 
+std::vector<fsmsg::recording_gap_t> NewLog::ShortGaps() const {
+  std::vector<fsmsg::recording_gap_t> gaps(gaps_.begin(), gaps_.begin() + std::min(gaps_.size(), kMaxGaps));
+  for (fsmsg::recording_gap_t& gap : gaps) {
+    gap.channel.resize(std::min(gap.channel.size(), kMaxLogChannelBytes));
+    gap.reason.resize(std::min(gap.reason.size(), kMaxReasonBytes));
+  }
+  if (gaps.size() < gaps_.size()) {
+    gaps.emplace_back();
+    gaps.back().reason = fmt::format("{} gaps more, which are not listed", gaps_.size() - kMaxGaps);
+  }
+  return gaps;
+}
+
 Status NewLog::Close(const std::string& reason) {
   AddChangedChannels();
   fsmsg::recording_closed_t closed{};
   closed.utime = last_utime_;
   closed.part = source_.closed ? source_.closed->part : source_.opened ? source_.opened->part : -1;
-  closed.verdict = source_.closed ? source_.closed->verdict : fsmsg::verdict_t::VERDICT_UNKNOWN;
+  const auto verdict = verdicts_.find(closed.part);
+  closed.verdict = source_.closed               ? source_.closed->verdict
+                   : verdict != verdicts_.end() ? verdict->second
+                                                : std::int8_t{fsmsg::verdict_t::VERDICT_UNKNOWN};
   closed.reason = reason;
   closed.channels = totals_.Totals();
   closed.channel_count = static_cast<std::int32_t>(closed.channels.size());
-  closed.gaps = gaps_;
+  closed.gaps = ShortGaps();
   closed.gap_count = static_cast<std::int32_t>(closed.gaps.size());
   RETURN_IF_ERROR(writer_.Write(kRecordingClosed.name, closed.utime, Encode(closed)));
   RETURN_IF_ERROR(writer_.Close());

@@ -2,6 +2,7 @@
 // closing event names what the source lacked and what was left out.
 #pragma once
 
+#include <map>
 #include <string>
 #include <utility>
 #include <vector>
@@ -33,10 +34,13 @@ class NewLog {
   // a bit is wrong somewhere, and a new count must not hide it.
   void AddChangedChannels();
   NewLog(const Recording& source, LogWriter writer);
+  // At most as many as a closing event holds.
+  std::vector<fsmsg::recording_gap_t> ShortGaps() const;
 
   const Recording& source_;
   LogWriter writer_;
   ChannelTotals totals_;
+  std::map<std::int32_t, std::int8_t> verdicts_;  // by part, of the messages copied
   std::vector<fsmsg::recording_gap_t> gaps_;
   std::int64_t last_utime_ = 0;  // of the last event copied
   bool is_open_ = true;

@@ -38,6 +38,12 @@ struct InspectOptions {
   double part_patience_s = 300.0;
 };
 
+// Without an error if nobody reads it any more: the parts in work are still inspected.
+void Print(const std::string& text) {
+  std::fputs(text.c_str(), stdout);
+  std::fflush(stdout);
+}
+
 // The outcome of every part, in the order of the verdicts.
 class Progress {
  public:
@@ -92,8 +98,8 @@ class Progress {
   template <typename... Args>
   void Say(int part, fmt::format_string<Args...> format, Args&&... args) {
     const double since_s = static_cast<double>(hub_.bus().NowUs() - start_us_) * 1e-6;
-    fmt::print("{:7.2f} s  part {}  {}\n", since_s, part, fmt::format(format, std::forward<Args>(args)...));
-    std::fflush(stdout);
+    Print(fmt::format("{:7.2f} s  part {}  {}\n", since_s, part,
+                      fmt::format(format, std::forward<Args>(args)...)));
   }
 
   std::int64_t start_us_;
@@ -125,11 +131,11 @@ Status InspectParts(StationRunner& runner, ProcessGroup& cell, const InspectOpti
                     const fs::path& run, const Progress& progress) {
   const Interrupt interrupt;
   if (const int bytes = runner.bus().Health().receive_buffer_bytes; bytes < kWantedReceiveBufferBytes) {
-    fmt::print(
+    Print(fmt::format(
         "note: the bus has receive buffers of {:.1f} MB, {:.0f} MB are wanted; what is lost is sent again "
         "(sysctl "
         "net.core.rmem_max={} avoids it)\n",
-        bytes * 1e-6, kWantedReceiveBufferBytes * 1e-6, kWantedReceiveBufferBytes / 2);
+        bytes * 1e-6, kWantedReceiveBufferBytes * 1e-6, kWantedReceiveBufferBytes / 2));
   }
   RETURN_IF_ERROR(
       cell.Start("virtual_station",
@@ -152,8 +158,8 @@ Status InspectParts(StationRunner& runner, ProcessGroup& cell, const InspectOpti
       return Fail(ErrorCode::kUnavailable, "{} {}", ended->service, ended->Text());
     }
   }
-  fmt::print("\n{}\ninspection took {:.0f} s, {} restarts\n", runner.Table(140, false), progress.Seconds(),
-             runner.restarts());
+  Print(fmt::format("\n{}\ninspection took {:.0f} s, {} restarts\n", runner.Table(140, false),
+                    progress.Seconds(), runner.restarts()));
   return {};
 }
 

@@ -1,4 +1,4 @@
-// Ctrl-C and SIGTERM as a question the tool asks between two steps.
+// Ctrl-C, SIGTERM and a terminal that goes away (SIGHUP) as a question the tool asks between two steps.
 #pragma once
 
 #include <csignal>
@@ -7,17 +7,19 @@ namespace forgescan {
 
 class Interrupt {
  public:
-  // Blocks both signals for this process and the threads it starts from now on.
+  // Blocks these signals for this process and the threads it starts from now on.
   Interrupt() {
     sigemptyset(&signals_);
     sigaddset(&signals_, SIGINT);
     sigaddset(&signals_, SIGTERM);
+    sigaddset(&signals_, SIGHUP);
     sigprocmask(SIG_BLOCK, &signals_, nullptr);
   }
   bool Requested() const {
     sigset_t pending;
     sigpending(&pending);
-    return sigismember(&pending, SIGINT) == 1 || sigismember(&pending, SIGTERM) == 1;
+    return sigismember(&pending, SIGINT) == 1 || sigismember(&pending, SIGTERM) == 1 ||
+           sigismember(&pending, SIGHUP) == 1;
   }
 
  private:

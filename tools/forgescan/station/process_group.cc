@@ -33,9 +33,13 @@ std::string LastLine(const std::string& path) {
 }
 
 // In the child: never returns. Only calls that are safe between fork and exec in a program with threads.
-[[noreturn]] void Become(char* const* arguments, int log) {
-  prctl(PR_SET_PDEATHSIG, SIGTERM);  // a tool that is killed leaves no services behind
-  setpgid(0, 0);                     // Ctrl-C reaches the tool, and the tool stops the services in order
+[[noreturn]] void Become(char* const* arguments, int log, pid_t parent) {
+  prctl(PR_SET_PDEATHSIG, SIGTERM);  // services end with a tool that is killed
+  if (getppid() != parent) {         // it was, before the call above
+    _exit(127);
+  }
+  setpgid(0, 0);                  // Ctrl-C reaches the tool, and the tool stops the services in order
+  std::signal(SIGPIPE, SIG_DFL);  // the tool may ignore it
   sigset_t none;
   sigemptyset(&none);
   sigprocmask(SIG_SETMASK, &none, nullptr);
@@ -53,61 +57,66 @@ Status ProcessGroup::Start(const std::string& name, const std::vector<std::strin
   std::filesystem::create_directories(log_folder_, problem);
   const int log = open(LogOf(name).c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
   if (log < 0 || access(command[0].c_str(), X_OK) != 0) {
+    const int reason = errno;
     close(log);
     return Fail(ErrorCode::kIo, "{} cannot be started with its log in {}: {}", command[0], LogOf(name),
-                std::strerror(errno));
+                std::strerror(reason));
   }
   std::vector<char*> arguments;
   for (const std::string& word : command) {
     arguments.push_back(const_cast<char*>(word.c_str()));
   }
   arguments.push_back(nullptr);
-  const pid_t pid = fork();
+  const pid_t self = getpid(), pid = fork();
+  const int reason = errno;
   if (pid == 0) {
-    Become(arguments.data(), log);
+    Become(arguments.data(), log, self);
   }
   close(log);
   if (pid < 0) {
-    return Fail(ErrorCode::kIo, "{} cannot be started: {}", command[0], std::strerror(errno));
+    return Fail(ErrorCode::kIo, "{} cannot be started: {}", command[0], std::strerror(reason));
   }
-  processes_.push_back({name, pid});
+  processes_.push_back({name, ProcessId::Of(pid)});
   return {};
 }
 
-ProcessEnd ProcessGroup::EndOf(const Process& process, int status) const {
+ProcessEnd ProcessGroup::Describe(const Process& process, int status) const {
   const bool killed = WIFSIGNALED(status);
   return {process.name, !killed, killed ? WTERMSIG(status) : WEXITSTATUS(status),
           LastLine(LogOf(process.name))};
 }
 
+std::optional<ProcessEnd> ProcessGroup::TakeIfEnded(Iterator process) {
+  int status = 0;
+  if (waitpid(process->id.pid, &status, WNOHANG) != process->id.pid) {
+    return std::nullopt;
+  }
+  ProcessEnd end = Describe(*process, status);
+  processes_.erase(process);
+  return end;
+}
+
 std::optional<ProcessEnd> ProcessGroup::Ended() {
   for (auto process = processes_.begin(); process != processes_.end(); ++process) {
-    int status = 0;
-    if (waitpid(process->pid, &status, WNOHANG) == process->pid) {
-      ProcessEnd end = EndOf(*process, status);
-      processes_.erase(process);
+    if (auto end = TakeIfEnded(process)) {
       return end;
     }
   }
   return std::nullopt;
 }
 
-pid_t ProcessGroup::PidOf(const std::string& name) const {
-  for (const Process& process : processes_) {
-    if (process.name == name) {
-      return process.pid;
-    }
-  }
-  return 0;
+std::optional<ProcessEnd> ProcessGroup::EndOf(const std::string& name) {
+  const auto process = std::ranges::find_if(processes_, [&](const Process& one) { return one.name == name; });
+  return process == processes_.end() ? std::nullopt : TakeIfEnded(process);
 }
 
-bool ProcessGroup::Reaped(const std::string& name) {
-  const pid_t pid = PidOf(name);
-  if (pid != 0 && waitpid(pid, nullptr, WNOHANG) != pid) {
-    return false;
+ProcessId ProcessGroup::IdOf(const std::string& name) const {
+  for (const Process& process : processes_) {
+    if (process.name == name) {
+      return process.id;
+    }
   }
-  std::erase_if(processes_, [&](const Process& process) { return process.name == name; });
-  return true;
+  return {};
 }
 
 Status ProcessGroup::WaitForSuccess() {
@@ -116,11 +125,11 @@ Status ProcessGroup::WaitForSuccess() {
     int status = 0;
     pid_t ended = -1;
     do {
-      ended = waitpid(process.pid, &status, 0);
+      ended = waitpid(process.id.pid, &status, 0);
     } while (ended < 0 && errno == EINTR);
     processes_.pop_back();
-    if (ended != process.pid || status != 0) {
-      return Fail(ErrorCode::kUnavailable, "{} {}", process.name, EndOf(process, status).Text());
+    if (ended != process.id.pid || status != 0) {
+      return Fail(ErrorCode::kUnavailable, "{} {}", process.name, Describe(process, status).Text());
     }
   }
   return {};
@@ -134,7 +143,7 @@ void ProcessGroup::Signal(const std::string& name, int signal) const {
 
 void ProcessGroup::Signal(int signal) const {
   for (const Process& process : processes_) {
-    kill(process.pid, signal);
+    kill(process.id.pid, signal);
   }
 }
 
@@ -148,7 +157,7 @@ bool ProcessGroup::WaitForEnd(pid_t pid) {
 
 void ProcessGroup::Stop() {
   while (!processes_.empty()) {
-    const pid_t pid = processes_.back().pid;
+    const pid_t pid = processes_.back().id.pid;
     kill(pid, SIGTERM);
     if (!WaitForEnd(pid)) {
       kill(pid, SIGKILL);

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "services/common/result.h"
+#include "tools/forgescan/station/process_id.h"
 #include "tools/forgescan/station/supervisor.h"
 
 namespace forgescan {
@@ -24,26 +25,29 @@ class ProcessGroup {
   Status Start(const std::string& name, const std::vector<std::string>& command);
   // The first process that has ended and was not told of; nothing = all run.
   std::optional<ProcessEnd> Ended();
-  // 0 = no such process, or it has ended.
-  pid_t PidOf(const std::string& name) const;
+  // {} = no such process, or its end has been told.
+  ProcessId IdOf(const std::string& name) const;
+  pid_t PidOf(const std::string& name) const { return IdOf(name).pid; }
   // Waits for all to end by themselves. Errors: kUnavailable (one failed; the end of its log is in the
   // sentence).
   Status WaitForSuccess();
   // Sends a signal to all, or to one.
   void Signal(int signal) const;
   void Signal(const std::string& name, int signal) const;
-  // True once the process has ended; it is then forgotten.
-  bool Reaped(const std::string& name);
+  // How this one ended; it is then forgotten. Nothing = it runs, or there is no such process.
+  std::optional<ProcessEnd> EndOf(const std::string& name);
   // SIGTERM to one after the other, last started first; SIGKILL for one that has not ended after 10 s.
   void Stop();
 
  private:
   struct Process {
     std::string name;
-    pid_t pid;
+    ProcessId id;
   };
+  using Iterator = std::vector<Process>::iterator;
   static bool WaitForEnd(pid_t pid);
-  ProcessEnd EndOf(const Process& process, int status) const;
+  std::optional<ProcessEnd> TakeIfEnded(Iterator process);
+  ProcessEnd Describe(const Process& process, int status) const;
   std::string LogOf(const std::string& name) const { return log_folder_ + "/" + name + ".log"; }
 
   std::string log_folder_;

@@ -2,6 +2,7 @@
 
 #include <fmt/ranges.h>
 
+#include <cstdio>
 #include <string>
 
 namespace forgescan {
@@ -29,7 +30,7 @@ void ShowReport(const fs::path& run, const fs::path& folder, int part, Problems&
         fmt::format("part {} has no report in {}; {} has the logs", part, folder.string(), run.string()));
     return;
   }
-  fmt::print("report {}\n", folder.string());
+  std::printf("report %s\n", folder.c_str());
   const fs::path truth = run / "truth" / fmt::format("part_{:06}.json", part);
   std::error_code problem;
   fs::copy_file(truth, folder / "truth.json", fs::copy_options::overwrite_existing, problem);

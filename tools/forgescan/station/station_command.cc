@@ -18,7 +18,6 @@ namespace {
 constexpr std::int64_t kReadyPatienceUs = 60'000'000;
 constexpr std::int64_t kStatusListenUs = 2'500'000;  // every service speaks once a second
 constexpr std::int64_t kRedrawUs = 1'000'000;
-constexpr int kDownPatienceS = 150;  // longest stop with the default policy: draining, then nine services
 
 struct StationOptions {
   std::string folder;
@@ -76,43 +75,46 @@ Status Up(const StationOptions& options) {
 }
 
 Status Down(const StationOptions& options) {
-  ASSIGN_OR_RETURN(const StationProcesses station, RunningStation(options.folder));
-  kill(station.pid, SIGTERM);
+  ASSIGN_OR_RETURN(const RunningStation station, RunningStation::Find(options.folder));
+  kill(station.pid(), SIGTERM);
   constexpr int kStepsPerS = 10;
-  for (int step = 0; step < kDownPatienceS * kStepsPerS; ++step) {
-    if (!RunningStation(options.folder).ok()) {
+  for (int step = 0; step < station.stop_patience_s() * kStepsPerS; ++step) {
+    if (!station.IsUp()) {
       std::printf("station %s is down\n", options.folder.c_str());
-      return {};
+      return station.Outcome();
     }
     usleep(1'000'000 / kStepsPerS);
   }
   return Fail(ErrorCode::kTimeout, "station {} (process {}) has not stopped within {} s", options.folder,
-              station.pid, kDownPatienceS);
+              station.pid(), station.stop_patience_s());
 }
 
 Status ShowStatus(const StationOptions& options) {
-  ASSIGN_OR_RETURN(const StationProcesses running, RunningStation(options.folder));
+  ASSIGN_OR_RETURN(const RunningStation running, RunningStation::Find(options.folder));
   ASSIGN_OR_RETURN(const Station station, Station::Load(options.folder));
-  RETURN_IF_ERROR(JoinNetworkOf(running.pid));
+  RETURN_IF_ERROR(JoinNetworkOf(running.pid()));
   ASSIGN_OR_RETURN(const auto bus, LcmBus::Open(station.bus_url));
   const StateTable table(*bus);
   ProcessUsage usage;
   std::vector<std::string> names;
   std::vector<TableRow> rows;
   for (const StationService& service : StationServices(station)) {
-    const auto found = running.services.find(service.name);
-    const ServiceProcess process = found == running.services.end() ? ServiceProcess{} : found->second;
-    static_cast<void>(usage.Of(process.pid, bus->NowUs()));  // the processor's share is of the time from here
+    const auto found = running.services().find(service.name);
+    const ServiceProcess known = found == running.services().end() ? ServiceProcess{} : found->second;
+    static_cast<void>(
+        usage.Of(known.process.pid, bus->NowUs()));  // the processor's share is of the time from here
     names.push_back(service.name);
-    rows.push_back({.service = service.name, .usage = {}, .restarts = process.restarts, .given_up = false});
+    rows.push_back(
+        {.service = service.name, .usage = {}, .restarts = known.restarts, .given_up = known.given_up});
   }
   const std::int64_t until_us = bus->NowUs() + kStatusListenUs;
   while (bus->NowUs() < until_us) {
     RETURN_IF_ERROR(bus->RunOnce(until_us - bus->NowUs()));
   }
   for (TableRow& row : rows) {
-    const auto found = running.services.find(row.service);
-    row.usage = found == running.services.end() ? std::nullopt : usage.Of(found->second.pid, bus->NowUs());
+    const auto found = running.services().find(row.service);
+    row.usage =
+        found == running.services().end() ? std::nullopt : usage.Of(found->second.process.pid, bus->NowUs());
   }
   if (options.json) {
     std::printf("%s\n", table.Json(rows).c_str());

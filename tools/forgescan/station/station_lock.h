@@ -1,46 +1,90 @@
 // FOLDER/station.pid: which process runs the station, and those of its services. Held under a lock while the
-// station is up, so that a file left behind by a crash names nobody.
+// station is up, so that a file left behind by a crash says only what may still run.
+//
+//   PID STARTED_TICKS STOP_PATIENCE_S       of the supervisor
+//   NAME PID RESTARTS STARTED_TICKS GIVEN_UP   one line a service; or, as the last word, one line
+//   stopped SENTENCE                        how the stop went; no sentence: in order
 #pragma once
-
-#include <sys/types.h>
 
 #include <map>
 #include <string>
+#include <utility>
 
 #include "services/common/result.h"
+#include "tools/forgescan/station/process_id.h"
 
 namespace forgescan {
 
 struct ServiceProcess {
-  pid_t pid = 0;  // 0: not running
+  ProcessId process;  // pid 0: not running
   int restarts = 0;
+  bool given_up = false;
   bool operator==(const ServiceProcess&) const = default;
 };
+using ServiceProcesses = std::map<std::string, ServiceProcess>;
 
-struct StationProcesses {
-  pid_t pid = 0;  // that runs the station
-  std::map<std::string, ServiceProcess> services;
+// A file descriptor, closed with the object.
+class OwnedFd {
+ public:
+  explicit OwnedFd(int fd) : fd_(fd) {}
+  OwnedFd(OwnedFd&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
+  OwnedFd& operator=(OwnedFd&&) = delete;
+  ~OwnedFd();
+  int get() const { return fd_; }
+
+ private:
+  int fd_;
 };
 
-// Errors: kNotFound (the station is not up).
-Result<StationProcesses> RunningStation(const std::string& folder);
+// A station that is up, as somebody else than its supervisor sees it. Looking takes no lock.
+class RunningStation {
+ public:
+  // Errors: kNotFound (the station is not up).
+  static Result<RunningStation> Find(const std::string& folder);
+
+  pid_t pid() const { return supervisor_.pid; }
+  // The longest an ordered stop can take.
+  double stop_patience_s() const { return stop_patience_s_; }
+  // As they were when the station was found.
+  const ServiceProcesses& services() const { return services_; }
+  bool IsUp() const;
+  // Once it is not up any more: how it stopped. Errors: kUnavailable (not in order, with the sentence).
+  Status Outcome() const;
+
+ private:
+  explicit RunningStation(OwnedFd file) : file_(std::move(file)) {}
+
+  OwnedFd file_;  // can still be read when it has been removed
+  ProcessId supervisor_;
+  double stop_patience_s_ = 0;
+  ServiceProcesses services_;
+};
 
 // Held by whoever runs the station.
 class StationLock {
  public:
   // Errors: kUnavailable (somebody else holds it), kIo (not to be written).
-  static Result<StationLock> Take(const std::string& folder);
-  StationLock(StationLock&& other) noexcept;
+  static Result<StationLock> Take(const std::string& folder, double stop_patience_s);
+  StationLock(StationLock&&) = default;
   StationLock& operator=(StationLock&&) = delete;
   ~StationLock();
 
-  Status Write(const std::map<std::string, ServiceProcess>& services) const;
+  // Services of an earlier supervisor that did not stop in order. They may still run.
+  const ServiceProcesses& left_behind() const { return left_behind_; }
+  // Errors: kIo.
+  Status Write(const ServiceProcesses& services) const;
+  // The last word, for RunningStation::Outcome(). Errors: kIo.
+  Status WriteOutcome(const Status& outcome) const;
 
  private:
-  StationLock(std::string path, int fd) : path_(std::move(path)), fd_(fd) {}
+  StationLock(std::string path, OwnedFd file, double stop_patience_s)
+      : path_(std::move(path)), file_(std::move(file)), stop_patience_s_(stop_patience_s) {}
+  Status WriteText(const std::string& text) const;
 
   std::string path_;
-  int fd_;
+  OwnedFd file_;
+  double stop_patience_s_;
+  ServiceProcesses left_behind_;
 };
 
 }  // namespace forgescan

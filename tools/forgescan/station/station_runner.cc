@@ -8,6 +8,7 @@
 
 #include "services/common/bus/channels.h"
 #include "services/common/bus/stream_hub.h"
+#include "tools/forgescan/station/leftovers.h"
 
 namespace forgescan {
 namespace {
@@ -35,6 +36,16 @@ std::vector<std::string> CommandOf(const std::string& name, const Station& stati
     }
   }
   return {name};
+}
+
+// Longer than any stop in order: every service at the end of its patience, and then killed.
+double LongestStopS(const Station& station, const SupervisionPolicy& policy) {
+  constexpr double kMarginS = 30;
+  double sum_s = policy.drain_s + kMarginS;
+  for (const StationService& service : StationServices(station)) {
+    sum_s += policy.StopPatienceS(service.name);
+  }
+  return sum_s;
 }
 
 ServiceWord WordOf(const State& state) {
@@ -67,17 +78,24 @@ StationRunner::StationRunner(Parts parts)
 
 Result<std::unique_ptr<StationRunner>> StationRunner::Create(const std::string& folder, Echo echo) {
   ASSIGN_OR_RETURN(Station station, Station::Load(folder));
-  ASSIGN_OR_RETURN(SupervisionPolicy policy, SupervisionPolicy::Load(station.file.Table("supervision")));
-  ASSIGN_OR_RETURN(StationLock lock, StationLock::Take(folder));
+  ASSIGN_OR_RETURN(SupervisionPolicy policy, SupervisionPolicy::Load(station.file));
+  ASSIGN_OR_RETURN(StationLock lock, StationLock::Take(folder, LongestStopS(station, policy)));
   ASSIGN_OR_RETURN(SupervisorLog log, SupervisorLog::Open(LogFolder(folder), echo));
+  RETURN_IF_ERROR(EndLeftovers(lock.left_behind(), policy, log));
+  std::signal(SIGPIPE, SIG_IGN);  // nobody reads the output any more: no reason to leave the services alone
   ASSIGN_OR_RETURN(auto bus, LcmBus::Open(station.bus_url));
   return std::unique_ptr<StationRunner>(
       new StationRunner({std::move(station), policy, std::move(lock), std::move(log), std::move(bus)}));
 }
 
+// Stops at the action that shows that the station cannot work: no further service is started then.
 void StationRunner::Carry(const Supervisor::Actions& actions) {
+  const bool refused = !supervisor_.refused().empty();
   for (const SupervisorAction& action : actions) {
     std::visit([this](const auto& one) { Do(one); }, action);
+    if (!refused && !supervisor_.refused().empty()) {
+      return;
+    }
   }
 }
 
@@ -98,23 +116,33 @@ void StationRunner::Do(const SupervisorEvent& event) {
   log_.Write(event.service, event.text, !usual || after_restart);
 }
 
-std::map<std::string, ServiceProcess> StationRunner::Processes() const {
-  std::map<std::string, ServiceProcess> processes;
+ServiceProcesses StationRunner::Processes() const {
+  ServiceProcesses processes;
   for (const std::string& name : names_) {
-    processes[name] = {processes_.PidOf(name), supervisor_.restarts(name)};
+    processes[name] = {processes_.IdOf(name), supervisor_.restarts(name),
+                       supervisor_.phase(name) == Supervisor::Phase::kGivenUp};
   }
   return processes;
 }
 
+// A full disk is told, but ends no station.
+void StationRunner::NoteProcesses() {
+  ServiceProcesses now = Processes();
+  if (now == noted_) {
+    return;
+  }
+  if (const Status written = lock_.Write(now); !written.ok()) {
+    log_.Write("station", written.error().message, true);
+  }
+  noted_ = std::move(now);
+}
+
 Status StationRunner::Step() {
-  const auto before = Processes();
   while (const auto end = processes_.Ended()) {
     Carry(supervisor_.OnEnd(*end, bus_->NowUs()));
   }
   Carry(supervisor_.OnTick(bus_->NowUs()));
-  if (Processes() != before) {
-    RETURN_IF_ERROR(lock_.Write(Processes()));
-  }
+  NoteProcesses();
   if (!supervisor_.refused().empty()) {
     return Fail(ErrorCode::kUnavailable, "station {}: {}", station_.name, supervisor_.refused());
   }
@@ -170,14 +198,28 @@ bool StationRunner::WaitFor(double patience_s, const Condition& condition) {
 }
 
 void StationRunner::StopOne(const std::string& name) {
+  const double patience_s = policy_.StopPatienceS(name);
   processes_.Signal(name, SIGTERM);
-  if (WaitFor(policy_.stop_patience_s, [&] { return processes_.Reaped(name); })) {
+  if (WaitFor(patience_s, [&] { return HasStopped(name); })) {
     return;
   }
-  log_.Write(name, fmt::format("has not stopped within {} s: KILLED", policy_.stop_patience_s), true);
+  log_.Write(name, fmt::format("has not stopped within {} s: KILLED", patience_s), true);
   processes_.Signal(name, SIGKILL);
-  killed_.push_back(name);
-  WaitFor(policy_.stop_patience_s, [&] { return processes_.Reaped(name); });
+  stop_faults_.push_back(name + " had to be killed to stop");
+  WaitFor(patience_s, [&] { return processes_.EndOf(name).has_value(); });
+}
+
+bool StationRunner::HasStopped(const std::string& name) {
+  const auto end = processes_.EndOf(name);
+  if (!end.has_value()) {
+    return false;
+  }
+  const bool in_order = end->by_itself ? end->code == 0 : end->code == SIGTERM;  // as it was just started
+  if (!in_order) {
+    log_.Write(name, end->Text(), true);
+    stop_faults_.push_back(name + " " + end->Text());
+  }
+  return true;
 }
 
 void StationRunner::StopStage(StationStage stage) {
@@ -211,17 +253,24 @@ Status StationRunner::Stop() {
   Drain();
   StopStage(kComputing);
   StopStage(kRecording);
-  const auto lost = supervisor_.given_up();
-  log_.Write("station", fmt::format("is down, {} restarts{}", restarts(), lost.empty() ? "" : ", DEGRADED"));
-  if (!lost.empty()) {
-    return Fail(ErrorCode::kUnavailable, "station {} ran degraded: {} was given up", station_.name,
-                fmt::join(lost, ", "));
+  log_.Write("station", fmt::format("is down, {} restarts{}", restarts(),
+                                    supervisor_.given_up().empty() ? "" : ", DEGRADED"));
+  Status outcome = StopOutcome();
+  if (const Status told = lock_.WriteOutcome(outcome); !told.ok()) {
+    log_.Write("station", told.error().message, true);
   }
-  if (!killed_.empty()) {
-    return Fail(ErrorCode::kUnavailable, "station {}: {} had to be killed to stop", station_.name,
-                fmt::join(killed_, ", "));
+  return outcome;
+}
+
+Status StationRunner::StopOutcome() const {
+  std::vector<std::string> faults;
+  for (const std::string& name : supervisor_.given_up()) {
+    faults.push_back(name + " was given up");
   }
-  return {};
+  faults.insert(faults.end(), stop_faults_.begin(), stop_faults_.end());
+  return faults.empty()
+             ? Status()
+             : Fail(ErrorCode::kUnavailable, "station {}: {}", station_.name, fmt::join(faults, "; "));
 }
 
 }  // namespace forgescan

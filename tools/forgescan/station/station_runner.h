@@ -31,7 +31,8 @@ class StationRunner {
   // kUnavailable (a service cannot work on this station, or was given up and the policy is to stop then).
   Status RunFor(std::int64_t duration_us);
   // Stops makers of parts first, the computing services when the parts in work have their verdict, the
-  // recorder last. Errors: kUnavailable, naming what was given up before or had to be killed now.
+  // recorder last. Errors: kUnavailable, naming what was given up before, failed while it stopped, or had to
+  // be killed.
   Status Stop();
 
   LcmBus& bus() { return *bus_; }
@@ -57,10 +58,14 @@ class StationRunner {
   void Do(const StartProcess& start);
   void Do(const KillProcess& kill);
   void Do(const SupervisorEvent& event);
-  std::map<std::string, ServiceProcess> Processes() const;
+  ServiceProcesses Processes() const;
+  void NoteProcesses();
   void Drain();
   void StopStage(StationStage stage);
   void StopOne(const std::string& name);
+  // True once it has ended; an end that is none in order is noted.
+  bool HasStopped(const std::string& name);
+  Status StopOutcome() const;
   // Until the condition holds, handling what arrives on the bus. False: not within that time.
   template <typename Condition>
   bool WaitFor(double patience_s, const Condition& condition);
@@ -74,7 +79,8 @@ class StationRunner {
   std::vector<std::string> names_;
   Supervisor supervisor_;
   ProcessUsage usage_;
-  std::vector<std::string> killed_;  // while stopping
+  ServiceProcesses noted_;                // in the lock's file
+  std::vector<std::string> stop_faults_;  // sentences
   ProcessGroup processes_;
 };
 

@@ -9,6 +9,7 @@
 #include <filesystem>
 
 #include "services/common/output_file.h"
+#include "services/recorder/recorder_config.h"
 #include "tools/forgescan/station/network.h"
 #include "tools/forgescan/station/station_services.h"
 
@@ -87,7 +88,9 @@ class Units {
   std::string UnitOf(const std::string& service) const { return prefix_ + "-" + service + ".service"; }
   // Units of the services before this one in the order of starting; of all, for an empty name.
   std::vector<std::string> Before(const std::string& service) const;
-  std::string Supervision() const;
+  std::string Supervision(const std::string& service) const;
+  // Folders the service writes to; all else is read-only.
+  std::string Writable(const std::string& service) const;
 
   const Station& station_;
   const SupervisionPolicy& policy_;
@@ -131,14 +134,19 @@ UnitFile Units::Route() const {
   return {prefix_ + "-route.service", text};
 }
 
-// systemd's own limits, from the same policy. It has no growing back-off: the pause is that of the second
-// restart.
-std::string Units::Supervision() const {
+// systemd's own limits, from the same policy. It has no growing back-off: the pause is the one before the
+// second restart, and 1 s at most.
+std::string Units::Supervision(const std::string& service) const {
   return fmt::format(
       "Restart=on-failure\nRestartSec={}\nTimeoutStartSec={}\nTimeoutStopSec={}\nWatchdogSec={}\n"
       "WatchdogSignal=SIGKILL\n",
       std::min(policy_.backoff_s, 1.0), std::ceil(policy_.start_patience_s),
-      std::ceil(policy_.stop_patience_s), policy_.silence_s);
+      std::ceil(policy_.StopPatienceS(service)), policy_.silence_s);
+}
+
+std::string Units::Writable(const std::string& service) const {
+  const std::string common = fmt::format("{}/log {}", options_.folder, station_.results);
+  return service == "recorder" ? common + " " + options_.recordings : common;
 }
 
 UnitFile Units::Service(const StationService& service) const {
@@ -156,13 +164,15 @@ UnitFile Units::Service(const StationService& service) const {
       "[Service]\nType=notify\nNotifyAccess=main\nExecStart={} --station {}\nUser={}\nGroup={}\n{}",
       service.name, station_.name, prefix_ + ".target", prefix_ + "-route.service",
       prefix_ + "-route.service", fmt::join(before, " "), start_limit, command, options_.folder,
-      options_.user, options_.user, Supervision());
-  text += fmt::format("MemoryMax={}\nCPUWeight={}\nTasksMax=256\nLimitNOFILE=1024\nLimitCORE=0\n",
-                      limits.memory, limits.cpu_weight);
+      options_.user, options_.user, Supervision(service.name));
+  // The last three as tools/setup-host has them for services started by hand.
+  text += fmt::format(
+      "MemoryMax={}\nCPUWeight={}\nTasksMax=256\nLimitCORE=0\n"
+      "LimitNOFILE=4096\nLimitRTPRIO=20\nLimitMEMLOCK=1G\n",
+      limits.memory, limits.cpu_weight);
   text += kHardening;
   text += fmt::format("RestrictAddressFamilies={}\nReadWritePaths={}\n\n[Install]\nWantedBy={}\n",
-                      Families(service.name, station_),
-                      fmt::format("{}/log {}", options_.folder, station_.results), prefix_ + ".target");
+                      Families(service.name, station_), Writable(service.name), prefix_ + ".target");
   return {UnitOf(service.name), text};
 }
 
@@ -170,11 +180,10 @@ UnitFile Units::Service(const StationService& service) const {
 
 Result<std::vector<UnitFile>> MakeUnits(const Station& station, const SupervisionPolicy& policy,
                                         const UnitOptions& options) {
-  const std::pair<const char*, std::string> words[] = {{"the station's name", station.name},
-                                                       {"--user", options.user},
-                                                       {"the station's folder", options.folder},
-                                                       {"results", station.results},
-                                                       {"the programs' folder", options.programs}};
+  const std::pair<const char*, std::string> words[] = {
+      {"the station's name", station.name},          {"--user", options.user},
+      {"the station's folder", options.folder},      {"results", station.results},
+      {"the recorder's folder", options.recordings}, {"the programs' folder", options.programs}};
   for (const auto& [what, text] : words) {
     if (!IsPlain(text)) {
       return Fail(ErrorCode::kInvalidArgument,
@@ -201,7 +210,9 @@ Status WriteStationUnits(const UnitOptions& given) {
     options.folder.pop_back();
   }
   ASSIGN_OR_RETURN(const Station station, Station::Load(options.folder));
-  ASSIGN_OR_RETURN(const auto policy, SupervisionPolicy::Load(station.file.Table("supervision")));
+  ASSIGN_OR_RETURN(const auto policy, SupervisionPolicy::Load(station.file));
+  ASSIGN_OR_RETURN(const auto recorder, RecorderConfig::Load(station.file.Table("recorder")));
+  options.recordings = (fs::path(options.folder) / recorder.folder).lexically_normal().string();
   ASSIGN_OR_RETURN(const auto files, MakeUnits(station, policy, options));
   std::error_code problem;
   fs::create_directories(options.out, problem);
@@ -209,10 +220,10 @@ Status WriteStationUnits(const UnitOptions& given) {
     RETURN_IF_ERROR(WriteOutputFile(fs::path(options.out) / file.name, file.text));
   }
   std::printf(
-      "%zu units in %s; as root: cp them to /etc/systemd/system, make %s/log and %s, owned by %s, then\n"
-      "systemctl daemon-reload && systemctl enable --now forgescan-%s.target\n",
+      "%zu units in %s; as root: cp them to /etc/systemd/system, make the folders\n%s/log\n%s\n%s\n"
+      "owned by %s, then systemctl daemon-reload && systemctl enable --now forgescan-%s.target\n",
       files.size(), options.out.c_str(), options.folder.c_str(), station.results.c_str(),
-      options.user.c_str(), station.name.c_str());
+      options.recordings.c_str(), options.user.c_str(), station.name.c_str());
   return {};
 }
 

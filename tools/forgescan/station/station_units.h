@@ -15,6 +15,7 @@ struct UnitOptions {
   std::string programs;            // folder of forgescan-NAME
   std::string user = "forgescan";  // account and group
   std::string out;                 // folder for the files
+  std::string recordings;          // the recorder's folder
 };
 
 struct UnitFile {

@@ -19,10 +19,15 @@ struct SupervisionPolicy {
   bool keep_running = true;     // the rest of the station, when a service is given up
   double drain_s = 20;          // when the station stops: for the parts in work
   double stop_patience_s = 10;  // from SIGTERM to SIGKILL
+  // The same for the recorder, which has to write what it has received. Without a key: stop_patience_s, and
+  // the time a slow disk takes for [recorder] backlog_mb.
+  double recorder_stop_patience_s = 40;
+
+  double StopPatienceS(const std::string& service) const;
 
   // Reads the table [supervision]; every key is optional. Errors: as ConfigTable; the first wait longer than
-  // the longest.
-  static Result<SupervisionPolicy> Load(ConfigTable table);
+  // the longest; as RecorderConfig::Load.
+  static Result<SupervisionPolicy> Load(const ConfigFile& file);
 };
 
 }  // namespace forgescan

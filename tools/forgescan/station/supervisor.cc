@@ -70,7 +70,8 @@ Supervisor::Actions Supervisor::OnTick(std::int64_t now_us) {
     Service& service = services_.at(name);
     if (service.phase == Phase::kRunning) {
       CheckSilence(name, service, now_us, actions);
-    } else if (service.phase == Phase::kWaiting && service.stage <= stage_ && now_us >= service.due_us) {
+    } else if (refused_.empty() && service.phase == Phase::kWaiting && service.stage <= stage_ &&
+               now_us >= service.due_us) {
       Start(name, service, now_us, actions);
     }
   }
@@ -79,7 +80,7 @@ Supervisor::Actions Supervisor::OnTick(std::int64_t now_us) {
 
 void Supervisor::Start(const std::string& name, Service& service, std::int64_t now_us, Actions& actions) {
   service.phase = Phase::kRunning;
-  service.heard_us = now_us;
+  service.started_us = service.heard_us = now_us;
   service.starting = true;
   service.ready = false;
   if (service.was_started) {
@@ -110,7 +111,7 @@ void Supervisor::CheckSilence(const std::string& name, Service& service, std::in
 Supervisor::Actions Supervisor::OnWord(const ServiceWord& word, std::int64_t now_us) {
   const auto found = services_.find(word.service);
   if (found == services_.end() || found->second.phase != Phase::kRunning ||
-      word.session == found->second.ended_session) {
+      word.session < found->second.started_us || word.session == found->second.ended_session) {
     return {};
   }
   Service& service = found->second;

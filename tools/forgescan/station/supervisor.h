@@ -9,7 +9,7 @@
 // been given up, or when patience is over.
 //
 // A service that ends with an exit code other than 0 before it was ever ready cannot work with this station
-// file: the station is refused, as starting it again would change nothing.
+// file: the station is refused, as starting it again would change nothing, and nothing is started any more.
 #pragma once
 
 #include <cstdint>
@@ -50,9 +50,9 @@ struct ProcessEnd {
 // What a service said on SERVICE_STATE.
 struct ServiceWord {
   std::string service;
-  std::int64_t session = 0;
-  bool starting = false;  // has not said more than STARTING
-  bool ready = false;     // READY or WORKING
+  std::int64_t session = 0;  // when it began, us
+  bool starting = false;     // has not said more than STARTING
+  bool ready = false;        // READY or WORKING
 };
 
 class Supervisor {
@@ -68,6 +68,8 @@ class Supervisor {
   Supervisor(const SupervisionPolicy& policy, const std::vector<Member>& members);
 
   Actions OnTick(std::int64_t now_us);
+  // Words of a session that began before the service was last started are another process's: of the one
+  // that ended, or of one that nobody here has started.
   Actions OnWord(const ServiceWord& word, std::int64_t now_us);
   Actions OnEnd(const ProcessEnd& end, std::int64_t now_us);
 
@@ -84,6 +86,7 @@ class Supervisor {
     int stage = 0;
     Phase phase = Phase::kWaiting;
     std::int64_t due_us = 0;         // waiting: when it is started, once its stage is due
+    std::int64_t started_us = 0;     // the last time
     std::int64_t heard_us = 0;       // running: its last word, or its start
     std::int64_t ended_us = 0;       // 0: never
     std::int64_t session = 0;        // of its last word

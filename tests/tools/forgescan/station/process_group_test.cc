@@ -1,4 +1,4 @@
-// Processes of a station: how they end, and what they said last; the file that names them while they run.
+// Processes of a station: how they end, what they said last, and what is said of them.
 #include "tools/forgescan/station/process_group.h"
 
 #include <gmock/gmock.h>
@@ -10,8 +10,8 @@
 #include <filesystem>
 #include <fstream>
 
+#include "tools/forgescan/station/leftovers.h"
 #include "tools/forgescan/station/network.h"
-#include "tools/forgescan/station/station_lock.h"
 #include "tools/forgescan/station/supervisor_log.h"
 
 namespace forgescan {
@@ -20,6 +20,7 @@ namespace {
 namespace fs = std::filesystem;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::MatchesRegex;
 
 class ProcessGroupTest : public ::testing::Test {
  protected:
@@ -27,6 +28,16 @@ class ProcessGroupTest : public ::testing::Test {
   ~ProcessGroupTest() override { fs::remove_all(folder_); }
   Status Sh(const std::string& name, const std::string& script) {
     return group_.Start(name, {"/bin/sh", "-c", script});
+  }
+  // Between fork and exec it has the name of this program.
+  static bool Becomes(pid_t pid, const std::string& program) {
+    std::string name;
+    for (int turn = 0; turn < 6000 && name != program; ++turn) {
+      std::ifstream stream("/proc/" + std::to_string(pid) + "/comm");
+      std::getline(stream, name);
+      poll(nullptr, 0, 10);
+    }
+    return name == program;
   }
   ProcessEnd WaitForEnd() {
     for (int turn = 0; turn < 6000; ++turn) {
@@ -36,6 +47,11 @@ class ProcessGroupTest : public ::testing::Test {
       poll(nullptr, 0, 10);
     }
     return {"nobody within a minute", false, 0, ""};
+  }
+
+  std::string Read(const char* name) const {
+    std::ifstream stream(folder_ / name);
+    return {std::istreambuf_iterator<char>(stream), {}};
   }
 
   fs::path folder_ = fs::temp_directory_path() / ("forgescan-processes-" + std::to_string(getpid()));
@@ -58,9 +74,33 @@ TEST_F(ProcessGroupTest, TellsASignalAndNamesTheRightOne) {
   group_.Signal("two", SIGSEGV);
   EXPECT_EQ(WaitForEnd().Text(), "was killed by signal 11");
   EXPECT_GT(group_.PidOf("one"), 0);
-  EXPECT_FALSE(group_.Reaped("one"));
-  EXPECT_TRUE(group_.Reaped("two"));
-  EXPECT_TRUE(group_.Reaped("never there"));
+  EXPECT_FALSE(group_.EndOf("one").has_value());
+  EXPECT_FALSE(group_.EndOf("two").has_value()) << "that has been told";
+}
+
+TEST_F(ProcessGroupTest, TellsHowTheOneEndedThatIsAskedFor) {
+  ASSERT_TRUE(Sh("one", "exit 0").ok());
+  ASSERT_TRUE(Sh("two", "exec sleep 1000").ok());
+  group_.Signal("two", SIGSEGV);
+  std::optional<ProcessEnd> end;
+  for (int turn = 0; turn < 6000 && !end; ++turn) {
+    end = group_.EndOf("two");
+    poll(nullptr, 0, 10);
+  }
+  ASSERT_TRUE(end.has_value());
+  EXPECT_EQ(end->Text(), "was killed by signal 11");
+  EXPECT_EQ(WaitForEnd().service, "one");
+}
+
+TEST_F(ProcessGroupTest, AProcessIsNotTakenForALaterOneWithItsNumber) {
+  ASSERT_TRUE(Sh("one", "exec sleep 1000").ok());
+  const ProcessId one = group_.IdOf("one");
+  EXPECT_TRUE(one.Runs());
+  EXPECT_FALSE((ProcessId{one.pid, one.started_ticks + 1}).Runs());
+  group_.Signal("one", SIGKILL);
+  WaitForEnd();
+  EXPECT_FALSE(one.Runs());
+  EXPECT_EQ(ProcessId::Of(one.pid), ProcessId{});
 }
 
 TEST_F(ProcessGroupTest, FindsTheLastWordsOfALongLog) {
@@ -79,24 +119,41 @@ TEST_F(ProcessGroupTest, AProgramThatIsNotThereIsAnError) {
   EXPECT_THAT(started.error().message, HasSubstr("/no/such/program cannot be started"));
 }
 
-TEST_F(ProcessGroupTest, OnlyOneHoldsAStation) {
-  EXPECT_FALSE(RunningStation(folder_.string()).ok());
-  {
-    const auto lock = StationLock::Take(folder_.string());
-    ASSERT_TRUE(lock.ok()) << lock.error().message;
-    ASSERT_TRUE(lock->Write({{"fusion", {1234, 2}}, {"report", {0, 0}}}).ok());
-    const auto again = StationLock::Take(folder_.string());
-    ASSERT_FALSE(again.ok());
-    EXPECT_THAT(again.error().message, HasSubstr("is up already"));
-    const auto running = RunningStation(folder_.string());
-    ASSERT_TRUE(running.ok());
-    EXPECT_EQ(running->pid, getpid());
-    EXPECT_EQ(running->services.at("fusion").pid, 1234);
-    EXPECT_EQ(running->services.at("fusion").restarts, 2);
+TEST_F(ProcessGroupTest, ALogThatCannotBeWrittenIsNamedWithItsReason) {
+  ProcessGroup nowhere("/proc/no/such/folder");
+  const Status started = nowhere.Start("shell", {"/bin/sh", "-c", "exit 0"});
+  ASSERT_FALSE(started.ok());
+  EXPECT_THAT(started.error().message, HasSubstr("shell.log: No such file or directory"));
+}
+
+// A service with the right name that does not end when it is asked to, as one that hangs.
+TEST_F(ProcessGroupTest, WhatAnEarlierSupervisorLeftBehindIsEnded) {
+  const std::string program = (folder_ / "forgescan-hung").string();
+  fs::copy_file("/bin/sleep", program);
+  ASSERT_TRUE(group_.Start("hung", {program, "1000"}).ok());
+  ASSERT_TRUE(group_.Start("later", {program, "1000"}).ok());
+  ASSERT_TRUE(Sh("stranger", "exec sleep 1000").ok());
+  for (const char* name : {"hung", "later"}) {
+    ASSERT_TRUE(Becomes(group_.PidOf(name), "forgescan-hung"));
   }
-  EXPECT_FALSE(RunningStation(folder_.string()).ok());
-  std::ofstream(folder_ / "station.pid") << getpid() << "\n";  // left behind by a crash
-  EXPECT_FALSE(RunningStation(folder_.string()).ok()) << "nobody holds it";
+  group_.Signal("hung", SIGSTOP);
+  ProcessId later = group_.IdOf("later");
+  ++later.started_ticks;  // another process had that number
+  SupervisionPolicy policy;
+  policy.stop_patience_s = 0.2;
+  auto log = SupervisorLog::Open(folder_.string(), Echo::kNothing);
+  ASSERT_TRUE(log.ok());
+  EXPECT_TRUE(EndLeftovers({{"hung", {group_.IdOf("hung"), 0, false}},
+                            {"later", {later, 0, false}},
+                            {"none", {}},
+                            {"stranger", {group_.IdOf("stranger"), 0, false}}},
+                           policy, *log)
+                  .ok());
+  const ProcessEnd end = WaitForEnd();
+  EXPECT_EQ(end.service, "hung");
+  EXPECT_EQ(end.Text(), "was killed by signal 9");
+  EXPECT_TRUE(group_.IdOf("later").Runs());
+  EXPECT_TRUE(group_.IdOf("stranger").Runs());
 }
 
 TEST_F(ProcessGroupTest, TheSupervisorsLogIsAppendedTo) {
@@ -105,11 +162,25 @@ TEST_F(ProcessGroupTest, TheSupervisorsLogIsAppendedTo) {
     ASSERT_TRUE(log.ok());
     log->Write("fusion", text);
   }
-  std::ifstream stream(folder_ / "supervisor.log");
-  const std::string text{std::istreambuf_iterator<char>(stream), {}};
-  EXPECT_THAT(text, ::testing::MatchesRegex("[0-9-]+ [0-9:.]+ fusion: is started\n"
-                                            "[0-9-]+ [0-9:.]+ fusion: was killed by signal 9\n"));
+  EXPECT_THAT(Read("supervisor.log"), MatchesRegex("[0-9-]+ [0-9:.]+ fusion: is started\n"
+                                                   "[0-9-]+ [0-9:.]+ fusion: was killed by signal 9\n"));
   EXPECT_FALSE(SupervisorLog::Open("/proc/no/such/folder", Echo::kNothing).ok());
+}
+
+TEST_F(ProcessGroupTest, TheSupervisorsLogOutlivesAFullDisk) {
+  fs::create_symlink("/dev/full", folder_ / "supervisor.log");
+  auto log = SupervisorLog::Open(folder_.string(), Echo::kNothing);
+  ASSERT_TRUE(log.ok());
+  ::testing::internal::CaptureStderr();
+  log->Write("fusion", "first");
+  log->Write("fusion", "second");
+  EXPECT_THAT(::testing::internal::GetCapturedStderr(), HasSubstr("fusion: second\n"));
+  fs::remove(folder_ / "supervisor.log");  // there is room again
+  log->Write("fusion", "third");
+  log->Write("fusion", "fourth");
+  EXPECT_THAT(Read("supervisor.log"),
+              MatchesRegex("\n[0-9-]+ [0-9:.]+ supervisor: 2 lines could not be written here\n"
+                           "[0-9-]+ [0-9:.]+ fusion: third\n[0-9-]+ [0-9:.]+ fusion: fourth\n"));
 }
 
 TEST(Network, KnowsTheGroupsOfAStation) {

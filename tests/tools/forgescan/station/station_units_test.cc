@@ -28,7 +28,7 @@ std::map<std::string, std::string> TextsOf(const std::string& can_url,
   station.bus_url = "udpm://239.255.76.67:7667?ttl=0";
   station.can_url = can_url;
   station.results = "/srv/cell-1/results";
-  const UnitOptions options{"/srv/cell-1", "/opt/forgescan/bin", "forgescan", ""};
+  const UnitOptions options{"/srv/cell-1", "/opt/forgescan/bin", "forgescan", "", "/data/recordings"};
   std::map<std::string, std::string> texts;
   const auto units = MakeUnits(station, {}, options);
   EXPECT_TRUE(units.ok());
@@ -48,6 +48,13 @@ TEST(StationUnits, OneAServiceATargetAndARoute) {
   EXPECT_THAT(robot, HasSubstr("AF_CAN"));
   EXPECT_THAT(robot, HasSubstr("forgescan-cell-1-camera_left.service"));
   EXPECT_THAT(robot, HasSubstr("ReadWritePaths=/srv/cell-1/log /srv/cell-1/results\n"));
+  EXPECT_THAT(robot, HasSubstr("TimeoutStopSec=10\n"));
+  for (const char* limit : {"LimitNOFILE=4096\n", "LimitRTPRIO=20\n", "LimitMEMLOCK=1G\n"}) {
+    EXPECT_THAT(robot, HasSubstr(limit)) << "as in tools/setup-host";
+  }
+  const std::string recorder = texts.at("forgescan-cell-1-recorder.service");
+  EXPECT_THAT(recorder, HasSubstr("ReadWritePaths=/srv/cell-1/log /srv/cell-1/results /data/recordings\n"));
+  EXPECT_THAT(recorder, HasSubstr("TimeoutStopSec=40\n")) << "its backlog is to be written";
   const std::string camera = texts.at("forgescan-cell-1-camera_left.service");
   EXPECT_THAT(camera, HasSubstr("forgescan-camera left --station"));
   EXPECT_THAT(camera, Not(HasSubstr("AF_CAN")));
@@ -76,11 +83,14 @@ TEST(StationUnits, RefusesNamesThatWouldMeanSomethingElse) {
   Station station;
   station.name = "cell";
   station.results = "/srv/results";
-  const UnitOptions good{"/srv/cell", "/opt/bin", "forgescan", ""};
+  const UnitOptions good{"/srv/cell", "/opt/bin", "forgescan", "", "/data/recordings"};
   EXPECT_TRUE(MakeUnits(station, {}, good).ok());
   for (const char* folder : {"/srv/my cell", "/srv/50%", "/srv/a\nb", "", "/srv/$HOME"}) {
     UnitOptions wrong = good;
     wrong.folder = folder;
+    EXPECT_FALSE(MakeUnits(station, {}, wrong).ok()) << folder;
+    wrong = good;
+    wrong.recordings = folder;
     EXPECT_FALSE(MakeUnits(station, {}, wrong).ok()) << folder;
   }
   for (const char* name : {"../cell", "a cell", "a/b"}) {
@@ -102,7 +112,7 @@ TEST_P(Verified, HasNothingSystemdWouldWarnOf) {
   std::ofstream(base / "cell/station.toml")
       << "[station]\nname = \"cell\"\nbus = \"udpm://239.255.76.67:7667?ttl=0\"\ncan = \"" << GetParam()
       << "\"\ncalibration = \"c\"\npattern = \"p\"\nviews = \"v\"\nmodel = \"m\"\nfeatures = \"f\"\n"
-         "results = \"results\"\n";
+         "results = \"results\"\n[recorder]\nfolder = \"../disk/recordings\"\n";
   const auto call = [](const std::string& command, std::string& text) {
     FILE* pipe = popen((command + " 2>&1").c_str(), "r");
     std::array<char, 4096> buffer{};
@@ -117,6 +127,10 @@ TEST_P(Verified, HasNothingSystemdWouldWarnOf) {
                  written),
             0)
       << written;
+  EXPECT_THAT(written, HasSubstr("\n" + (base / "disk/recordings").string() + "\n"));
+  std::ifstream recorder(base / "units/forgescan-cell-recorder.service");
+  EXPECT_THAT(std::string(std::istreambuf_iterator<char>(recorder), {}),
+              HasSubstr(" " + (base / "disk/recordings").string() + "\n"));
   EXPECT_EQ(call("systemd-analyze verify --man=no " + (base / "units").string() + "/*", verified), 0)
       << verified;
   EXPECT_EQ(verified, "");

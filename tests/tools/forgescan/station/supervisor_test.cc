@@ -32,7 +32,13 @@ class SupervisorTest : public ::testing::Test {
       }
     }
   }
-  void Tick(double at_s) { Do(supervisor_.OnTick(At(at_s))); }
+  // What is started begins its session at once.
+  void Tick(double at_s) {
+    Do(supervisor_.OnTick(At(at_s)));
+    for (const std::string& service : started_) {
+      sessions_[service] = At(at_s) + 1;
+    }
+  }
   void Say(const std::string& service, double at_s, bool ready = true) {
     Do(supervisor_.OnWord({service, sessions_[service], false, ready}, At(at_s)));
   }
@@ -42,7 +48,6 @@ class SupervisorTest : public ::testing::Test {
   // Ends, is started again, and is ready again at once: one failure.
   void FailOnce(const std::string& service, double at_s) {
     Crash(service, at_s);
-    ++sessions_[service];
     for (double s = at_s; supervisor_.phase(service) == Phase::kWaiting; s += 0.1) {
       Tick(s);
       waited_s_ = s - at_s;
@@ -56,7 +61,7 @@ class SupervisorTest : public ::testing::Test {
   }
   static std::int64_t At(double s) { return 1'700'000'000'000'000 + static_cast<std::int64_t>(s * 1e6); }
 
-  std::map<std::string, std::int64_t> sessions_{{"report", 100}, {"camera", 200}, {"robot", 300}};
+  std::map<std::string, std::int64_t> sessions_;
   Supervisor supervisor_{{}, {{"report", 1}, {"camera", 2}, {"robot", 3}}};
   std::vector<std::string> started_, killed_;
   std::vector<SupervisorEvent> events_;
@@ -73,14 +78,15 @@ TEST_F(SupervisorTest, StartsStageByStage) {
   EXPECT_EQ(events_[0].kind, Kind::kReady);
   Tick(1.6);
   EXPECT_THAT(started_, ElementsAre("camera"));
-  Do(supervisor_.OnWord({"camera", 200, false, false}, At(2)));  // degraded: there is no camera, but it works
+  Do(supervisor_.OnWord({"camera", sessions_["camera"], false, false},
+                        At(2)));  // degraded: there is no camera, but it works
   Tick(2.1);
   EXPECT_THAT(started_, ElementsAre("robot"));
 }
 
 TEST_F(SupervisorTest, DoesNotWaitForeverForAStage) {
   Tick(0);
-  Do(supervisor_.OnWord({"report", 100, true, false}, At(1)));  // STARTING is not up
+  Do(supervisor_.OnWord({"report", sessions_["report"], true, false}, At(1)));  // STARTING is not up
   Tick(9.9);
   EXPECT_THAT(started_, IsEmpty());
   Tick(10.1);
@@ -96,7 +102,6 @@ TEST_F(SupervisorTest, StartsAKilledServiceAtOnceAndTellsHowLongItWasAway) {
   Tick(5);
   EXPECT_THAT(started_, ElementsAre("camera"));
   EXPECT_EQ(supervisor_.restarts("camera"), 1);
-  sessions_["camera"] = 201;
   Say("camera", 6.25);
   ASSERT_EQ(events_.size(), 1u);
   EXPECT_EQ(events_[0].text, "is ready, 1.25 s after it ended");
@@ -129,7 +134,7 @@ TEST_F(SupervisorTest, KillsTheSilentAndStartsThemAgain) {
 
 TEST_F(SupervisorTest, AServiceThatLoadsItsModelMayBeSilentForLonger) {
   Tick(0);
-  Do(supervisor_.OnWord({"report", 100, true, false}, At(0.1)));
+  Do(supervisor_.OnWord({"report", sessions_["report"], true, false}, At(0.1)));
   Tick(30);
   EXPECT_THAT(killed_, IsEmpty());
   Tick(30.2);
@@ -138,13 +143,35 @@ TEST_F(SupervisorTest, AServiceThatLoadsItsModelMayBeSilentForLonger) {
 
 TEST_F(SupervisorTest, LateWordsOfTheDeadDoNotMakeTheNextOneReady) {
   AllUp(0);
+  const std::int64_t dead = sessions_["camera"];
   Crash("camera", 5);
   Tick(5);
-  Say("camera", 5.01);  // sent before it was killed
+  Do(supervisor_.OnWord({"camera", dead, false, true}, At(5.01)));  // sent before it was killed
   EXPECT_THAT(events_, IsEmpty());
-  sessions_["camera"] = 150;  // lower: the clock was set back meanwhile
   Say("camera", 5.5);
   EXPECT_EQ(events_.size(), 1u);
+}
+
+TEST_F(SupervisorTest, LateWordsOfTheDeadCountForNothingWhereTheClockWasSetBack) {
+  AllUp(100);
+  const std::int64_t dead = sessions_["camera"];
+  Crash("camera", 5);
+  Tick(5);
+  Do(supervisor_.OnWord({"camera", dead, false, true}, At(5.01)));
+  EXPECT_THAT(events_, IsEmpty());
+  Say("camera", 5.5);
+  EXPECT_EQ(events_.size(), 1u);
+}
+
+// A service that outlived its supervisor talks on; it is none of the one that was started now.
+TEST_F(SupervisorTest, WordsOfAProcessItHasNotStartedKeepNobodyAlive) {
+  Tick(0);
+  for (double s = 0; s < 31; s += 1) {
+    Do(supervisor_.OnWord({"report", At(-1000), false, true}, At(s)));
+    EXPECT_THAT(events_, IsEmpty()) << "the report is not ready";
+  }
+  Tick(30.2);
+  EXPECT_THAT(killed_, ElementsAre("report"));
 }
 
 TEST_F(SupervisorTest, WaitsLongerFromFailureToFailure) {
@@ -189,8 +216,8 @@ TEST_F(SupervisorTest, RefusesAStationAServiceCannotWorkWith) {
   Tick(0);
   Do(supervisor_.OnEnd({"report", true, 1, "station.toml: report.part_timeout_s is 0"}, At(0.2)));
   EXPECT_EQ(supervisor_.refused(), "report ended with exit code 1: station.toml: report.part_timeout_s is 0");
-  Tick(5);
-  EXPECT_THAT(started_, ElementsAre("camera")) << "it is for the station to end";
+  Tick(15);
+  EXPECT_THAT(started_, IsEmpty()) << "the station ends";
 }
 
 TEST_F(SupervisorTest, AServiceKilledBeforeItWasReadyIsStartedAgain) {
@@ -213,7 +240,7 @@ TEST_F(SupervisorTest, WhatItDoesNotKnowChangesNothing) {
 
 TEST(SupervisionPolicy, IsReadWithLimits) {
   const auto load = [](const std::string& text) {
-    return SupervisionPolicy::Load(ConfigFile::Parse(text, "station.toml")->Table("supervision"));
+    return SupervisionPolicy::Load(*ConfigFile::Parse(text, "station.toml"));
   };
   const auto policy = load("[supervision]\nsilence_s = 20.0\nrestarts_max = 3\nkeep_running = false\n");
   ASSERT_TRUE(policy.ok()) << policy.error().message;
@@ -221,6 +248,14 @@ TEST(SupervisionPolicy, IsReadWithLimits) {
   EXPECT_EQ(policy->restarts_max, 3);
   EXPECT_FALSE(policy->keep_running);
   EXPECT_EQ(load("")->silence_s, 5.0);
+  EXPECT_EQ(load("")->StopPatienceS("fusion"), 10.0);
+  EXPECT_EQ(load("")->StopPatienceS("recorder"), 40.0) << "10 s, and 1500 MB at 50 MB/s";
+  EXPECT_EQ(load("")->StopPatienceS("recorder"), SupervisionPolicy().StopPatienceS("recorder"));
+  EXPECT_EQ(
+      load("[recorder]\nbacklog_mb = 500\n[supervision]\nstop_patience_s = 5.0\n")->StopPatienceS("recorder"),
+      15.0);
+  EXPECT_EQ(load("[supervision]\nrecorder_stop_patience_s = 7.0\n")->StopPatienceS("recorder"), 7.0);
+  EXPECT_FALSE(load("[recorder]\nbacklog_mb = 1\n").ok());
   for (const char* wrong : {"silence_s = 1.0", "silence_s = nan", "restarts_max = -1", "silence = 5.0",
                             "backoff_s = 10.0\nbackoff_max_s = 5.0"}) {
     EXPECT_FALSE(load("[supervision]\n" + std::string(wrong)).ok()) << wrong;

@@ -97,8 +97,9 @@ void RecorderService::Take(const WriterReport& report) {
     machine_.OnFailed(failed->file, failed->reason, Now());
   } else if (const auto* closed = std::get_if<FileClosed>(&report)) {
     const bool part = closed->part;
+    machine_.OnClosed(closed->file);
     monitor_.Count(!part ? "volumes_closed" : closed->gaps == 0 ? "parts_complete" : "parts_incomplete");
-    prune_us_ = part ? Now() : prune_us_;  // there is one more to choose from
+    pruned_us_ = part ? 0 : pruned_us_;  // there is one more to choose from
   } else if (const auto* note = std::get_if<WriterNote>(&report)) {
     if (note->what == WriterNote::What::kDeleted) {
       monitor_.Count("recordings_deleted");

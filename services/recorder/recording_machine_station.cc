@@ -11,7 +11,9 @@ namespace forgescan {
 namespace {
 
 constexpr std::int64_t kUsPerDay = 86'400'000'000;
-constexpr std::int64_t kRetryUs = 10'000'000;  // after the station's recording has failed
+// After the station's recording has failed; doubled each time until one is open again.
+constexpr std::int64_t kRetryUs = 10'000'000;
+constexpr int kMaxDoublings = 3;
 
 }  // namespace
 
@@ -27,7 +29,8 @@ void RecordingMachine::OpenVolume(std::int64_t now_us, Actions& actions) {
 void RecordingMachine::CloseVolume(const std::string& reason, std::int64_t now_us, Actions& actions) {
   if (station_.written()) {
     actions.emplace_back(
-        CloseRecording{station_.file, now_us, std::nullopt, 0, reason, std::move(station_.gaps)});
+        CloseRecording{station_.file, now_us, std::nullopt, 0, reason, std::exchange(station_.gaps, {})});
+    closing_.push_back({station_.file, std::nullopt});
   }
 }
 
@@ -37,11 +40,18 @@ void RecordingMachine::RenewVolume(std::int64_t now_us, Actions& actions) {
   if (station_.written() && due) {
     CloseVolume("the next volume follows", now_us, actions);
     OpenVolume(now_us, actions);
-  } else if (!station_.written() && space_trouble_.empty() && now_us - station_.broken_us >= kRetryUs) {
+    return;
+  }
+  const std::int64_t pause_us = kRetryUs << std::min(station_.failed_before, kMaxDoublings);
+  if (!station_.written() && space_trouble_.empty() && now_us - station_.broken_us >= pause_us) {
     auto gaps = std::move(station_.gaps);
-    AddGap(gaps, GapOf("", "the volume before this one broke off: " + station_trouble_));
+    const int failed_before = station_.failed_before;
+    if (failed_before == 0) {  // the others of the chain held nothing
+      AddGap(gaps, GapOf("", "the volume before this one broke off: " + station_trouble_));
+    }
     OpenVolume(now_us, actions);
     station_.gaps = std::move(gaps);
+    station_.failed_before = failed_before + 1;
   }
 }
 
@@ -58,6 +68,9 @@ std::string RecordingMachine::Trouble() const {
   }
   if (!station_trouble_.empty()) {
     return station_trouble_;
+  }
+  if (!closing_trouble_.empty()) {
+    return closing_trouble_;
   }
   const auto broken = std::find_if(parts_.begin(), parts_.end(),
                                    [](const Part& part) { return part.writing == Writing::kBroken; });

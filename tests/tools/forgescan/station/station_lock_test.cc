@@ -1,0 +1,150 @@
+// FOLDER/station.pid: who holds it, what others read in it, and what a crash leaves.
+#include "tools/forgescan/station/station_lock.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <poll.h>
+#include <unistd.h>
+
+#include <array>
+#include <atomic>
+#include <filesystem>
+#include <fstream>
+#include <optional>
+#include <thread>
+
+namespace forgescan {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+constexpr double kPatienceS = 120;
+
+class StationLockTest : public ::testing::Test {
+ protected:
+  StationLockTest() { fs::create_directories(folder_); }
+  ~StationLockTest() override { fs::remove_all(folder_); }
+  bool IsUp() const { return RunningStation::Find(folder_.string()).ok(); }
+  Result<StationLock> Take() const { return StationLock::Take(folder_.string(), kPatienceS); }
+  fs::path File() const { return folder_ / "station.pid"; }
+
+  fs::path folder_ = fs::temp_directory_path() / ("forgescan-lock-" + std::to_string(getpid()));
+};
+
+TEST_F(StationLockTest, OnlyOneHoldsAStation) {
+  EXPECT_FALSE(IsUp());
+  {
+    const auto lock = Take();
+    ASSERT_TRUE(lock.ok()) << lock.error().message;
+    const auto again = Take();
+    ASSERT_FALSE(again.ok());
+    EXPECT_THAT(again.error().message, HasSubstr("is up already"));
+    EXPECT_TRUE(IsUp()) << "a refused one lets go of nothing";
+  }
+  EXPECT_FALSE(IsUp());
+  EXPECT_TRUE(Take().ok());
+}
+
+TEST_F(StationLockTest, OthersReadWhatIsWritten) {
+  const auto lock = Take();
+  ASSERT_TRUE(lock.ok());
+  const ServiceProcesses written{{"fusion", {{1234, 99}, 2, false}}, {"report", {{0, 0}, 9, true}}};
+  ASSERT_TRUE(lock->Write(written).ok());
+  const auto running = RunningStation::Find(folder_.string());
+  ASSERT_TRUE(running.ok());
+  EXPECT_EQ(running->pid(), getpid());
+  EXPECT_EQ(running->stop_patience_s(), kPatienceS);
+  EXPECT_EQ(running->services(), written);
+}
+
+TEST_F(StationLockTest, AFileLeftBehindNamesNobodyButWhatMayStillRun) {
+  {
+    const auto lock = Take();
+    ASSERT_TRUE(lock.ok());
+    EXPECT_TRUE(lock->left_behind().empty());
+    ASSERT_TRUE(lock->Write({{"robot", {{1234, 99}, 0, false}}}).ok());
+    fs::copy_file(File(), folder_ / "crashed");
+  }
+  fs::rename(folder_ / "crashed", File());
+  EXPECT_FALSE(IsUp()) << "nobody holds it, though its process runs";
+  const auto lock = Take();
+  ASSERT_TRUE(lock.ok());
+  EXPECT_EQ(lock->left_behind().at("robot").process, (ProcessId{1234, 99}));
+  EXPECT_TRUE(RunningStation::Find(folder_.string())->services().contains("robot"));
+}
+
+// What stands in the file between the lock and the first word is of the supervisor before; its number may be
+// anybody's by now.
+TEST_F(StationLockTest, ALockedFileThatNamesAnotherProcessIsNotBelieved) {
+  const auto lock = Take();
+  ASSERT_TRUE(lock.ok());
+  std::ofstream(File()) << getppid() << " 1 120\n";
+  EXPECT_FALSE(IsUp());
+  std::ofstream(File()) << ProcessId::Of(getpid()).pid << " " << ProcessId::Of(getpid()).started_ticks
+                        << " 120\n";
+  EXPECT_TRUE(IsUp());
+}
+
+// Many look at once: none of them is taken for the one that runs the station.
+TEST_F(StationLockTest, LookingTakesNoLock) {
+  std::ofstream(File()) << ProcessId::Of(getpid()).pid << " " << ProcessId::Of(getpid()).started_ticks
+                        << " 120\n";
+  std::atomic<int> seen_up = 0;
+  std::array<std::thread, 4> lookers;
+  for (std::thread& looker : lookers) {
+    looker = std::thread([&] {
+      for (int i = 0; i < 2000; ++i) {
+        seen_up += IsUp() ? 1 : 0;
+      }
+    });
+  }
+  for (std::thread& looker : lookers) {
+    looker.join();
+  }
+  EXPECT_EQ(seen_up, 0);
+}
+
+// Stations that go down remove the file: a lock of a removed file holds nothing.
+TEST_F(StationLockTest, ManyTakersOneHolder) {
+  std::atomic<int> holders = 0, most = 0;
+  std::array<std::thread, 4> takers;
+  for (std::thread& taker : takers) {
+    taker = std::thread([&] {
+      for (int taken = 0; taken < 50;) {
+        if (const auto lock = Take(); lock.ok()) {
+          most = std::max(most.load(), ++holders);
+          poll(nullptr, 0, 1);  // long enough for another one to come in
+          --holders;
+          ++taken;
+        }
+      }
+    });
+  }
+  for (std::thread& taker : takers) {
+    taker.join();
+  }
+  EXPECT_EQ(most, 1);
+}
+
+TEST_F(StationLockTest, WhoStoppedItReadsHowThatWent) {
+  auto outcome_of = [this](const std::optional<Status>& said) {
+    const auto lock = Take();
+    const auto station = RunningStation::Find(folder_.string());
+    EXPECT_TRUE(station.ok());
+    EXPECT_TRUE(station->IsUp());
+    if (said.has_value()) {
+      EXPECT_TRUE(lock->WriteOutcome(*said).ok());
+    }
+    return station->Outcome();
+  };
+  EXPECT_TRUE(outcome_of(Status()).ok());
+  const Status killed = outcome_of(Fail(ErrorCode::kUnavailable, "fusion had to be killed"));
+  ASSERT_FALSE(killed.ok());
+  EXPECT_EQ(killed.error().message, "fusion had to be killed");
+  const Status crashed = outcome_of(std::nullopt);
+  ASSERT_FALSE(crashed.ok());
+  EXPECT_THAT(crashed.error().message, HasSubstr("without stopping its services in order"));
+}
+
+}  // namespace
+}  // namespace forgescan
