@@ -284,6 +284,17 @@ TEST_F(TwoStations, WhatOutlivesItsSupervisorIsEndedBeforeTheNextStart) {
   EXPECT_THAT(down.text, HasSubstr("deaf had to be killed to stop"));
 }
 
+// It is the first of its stage: nothing of the rest is worth a start.
+TEST_F(TwoStations, AServiceWithoutAProgramEndsTheStartAtOnce) {
+  const OneStation station(Folder(1), "incomplete", "");
+  std::ofstream(station.folder() / "station.toml", std::ios::app) << "[service.ghost]\n";
+  Background up(station.Command("up"), base_ / "incomplete.txt");
+  EXPECT_EQ(up.Wait(60), 1);
+  EXPECT_THAT(up.Text(), HasSubstr("forgescan-ghost cannot be started"));
+  EXPECT_THAT(station.Log(), HasSubstr("ghost: cannot work on this station"));
+  EXPECT_THAT(station.Log(), ::testing::Not(HasSubstr("report: is started")));
+}
+
 TEST_F(TwoStations, WhatWasGivenUpOrFailedWhileItStoppedIsToldByAll) {
   const OneStation station(Folder(1), "frail", "restarts_max = 0\n");
   Background up(station.Command("up"), base_ / "frail_up.txt");
