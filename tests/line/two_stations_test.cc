@@ -265,7 +265,8 @@ TEST_F(TwoStations, WhatOutlivesItsSupervisorIsEndedBeforeTheNextStart) {
   }
   fs::remove(programs / "forgescan");
   fs::copy_file(fs::path(FORGESCAN_BIN_DIR) / "forgescan", programs / "forgescan");
-  std::ofstream(programs / "forgescan-deaf") << "#!/bin/sh\ntrap '' TERM\nwhile :; do sleep 1; done\n";
+  std::ofstream(programs / "forgescan-deaf")
+      << "#!/bin/sh\ntrap '' TERM\nfor second in $(seq 120); do sleep 1; done\n";
   fs::permissions(programs / "forgescan-deaf", fs::perms::owner_all);
   std::ofstream(station.folder() / "station.toml", std::ios::app) << "[service.deaf]\n";
   const std::string up = (programs / "forgescan").string() + " station up " + station.folder().string();
