@@ -265,7 +265,8 @@ TEST_F(TwoStations, WhatOutlivesItsSupervisorIsEndedBeforeTheNextStart) {
   }
   fs::remove(programs / "forgescan");
   fs::copy_file(fs::path(FORGESCAN_BIN_DIR) / "forgescan", programs / "forgescan");
-  std::ofstream(programs / "forgescan-deaf") << "#!/bin/sh\ntrap '' TERM\nwhile :; do sleep 1; done\n";
+  std::ofstream(programs / "forgescan-deaf")
+      << "#!/bin/sh\ntrap '' TERM\nfor second in $(seq 120); do sleep 1; done\n";
   fs::permissions(programs / "forgescan-deaf", fs::perms::owner_all);
   std::ofstream(station.folder() / "station.toml", std::ios::app) << "[service.deaf]\n";
   const std::string up = (programs / "forgescan").string() + " station up " + station.folder().string();
@@ -282,6 +283,17 @@ TEST_F(TwoStations, WhatOutlivesItsSupervisorIsEndedBeforeTheNextStart) {
   const auto down = Call((programs / "forgescan").string() + " station down " + station.folder().string());
   EXPECT_EQ(down.exit_code, 1);
   EXPECT_THAT(down.text, HasSubstr("deaf had to be killed to stop"));
+}
+
+// It is the first of its stage: nothing of the rest is worth a start.
+TEST_F(TwoStations, AServiceWithoutAProgramEndsTheStartAtOnce) {
+  const OneStation station(Folder(1), "incomplete", "");
+  std::ofstream(station.folder() / "station.toml", std::ios::app) << "[service.ghost]\n";
+  Background up(station.Command("up"), base_ / "incomplete.txt");
+  EXPECT_EQ(up.Wait(60), 1);
+  EXPECT_THAT(up.Text(), HasSubstr("forgescan-ghost cannot be started"));
+  EXPECT_THAT(station.Log(), HasSubstr("ghost: cannot work on this station"));
+  EXPECT_THAT(station.Log(), ::testing::Not(HasSubstr("report: is started")));
 }
 
 TEST_F(TwoStations, WhatWasGivenUpOrFailedWhileItStoppedIsToldByAll) {
