@@ -35,7 +35,8 @@ class TwoStations : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
     base_ = fs::path(::testing::TempDir()) / ("forgescan_two_" + std::to_string(getpid()));
-    WriteSmallStation(base_, {{"silence_s = 30.0", "silence_s = 8.0\nstage_patience_s = 3.0"}});
+    WriteSmallStation(base_, {{"silence_s = 30.0", "silence_s = 8.0\nstage_patience_s = 3.0"},
+                              {"folder = \"../recordings\"", "folder = \"recordings\""}});
     const std::string tool = std::string(FORGESCAN_BIN_DIR) + "/forgescan";
     const auto prepared = Call(tool + "-virtual-station prepare --scale-divisor 4 --station " +
                                (base_ / "station").string() + " --run " + (base_ / "run").string());
