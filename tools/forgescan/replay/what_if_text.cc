@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -32,24 +33,28 @@ std::size_t Flips(const std::vector<PartChange>& parts) {
       std::count_if(parts.begin(), parts.end(), [](const auto& part) { return part.Flipped(); }));
 }
 
-// The largest change of each dimension over all parts.
-struct Largest {
+// What becomes of a dimension over all parts.
+struct Summary {
   std::string name;
-  double change_mm = 0.0;
-  int part = 0;
+  double change_mm = 0.0;    // the largest
+  int part = 0;              // of it
+  int lost = 0, gained = 0;  // sizes that are not determined any more, or only now
   int flips = 0;
 };
 
-std::vector<Largest> LargestChanges(const std::vector<PartChange>& parts) {
-  std::vector<Largest> all;
+std::vector<Summary> Summaries(const std::vector<PartChange>& parts) {
+  std::vector<Summary> all;
   for (const PartChange& part : parts) {
     for (const DimensionChange& d : part.dimensions) {
       auto found =
           std::find_if(all.begin(), all.end(), [&d](const auto& other) { return other.name == d.name; });
       if (found == all.end()) {
-        found = all.insert(all.end(), {d.name, 0.0, part.part, 0});
+        found = all.insert(all.end(), {.name = d.name});
       }
       found->flips += d.Flipped() ? 1 : 0;
+      const bool was = std::isfinite(d.recorded_mm), is = std::isfinite(d.now_mm);
+      found->lost += was && !is ? 1 : 0;
+      found->gained += is && !was ? 1 : 0;
       const double change_mm = d.now_mm - d.recorded_mm;
       if (std::isfinite(change_mm) && std::abs(change_mm) > std::abs(found->change_mm)) {
         found->change_mm = change_mm;
@@ -58,6 +63,23 @@ std::vector<Largest> LargestChanges(const std::vector<PartChange>& parts) {
     }
   }
   return all;
+}
+
+std::string SummaryText(const Summary& summary) {
+  std::vector<std::string> changes;
+  if (summary.change_mm != 0.0) {
+    changes.push_back(fmt::format("largest change {:+.4f} mm (part {})", summary.change_mm, summary.part));
+  }
+  if (summary.lost > 0) {
+    changes.push_back(fmt::format("{} sizes are not determined any more", summary.lost));
+  }
+  if (summary.gained > 0) {
+    changes.push_back(fmt::format("{} sizes are determined only now", summary.gained));
+  }
+  if (changes.empty()) {
+    changes.push_back("every size as recorded");
+  }
+  return fmt::format("{}, {} verdicts change", fmt::join(changes, ", "), summary.flips);
 }
 
 std::string DimensionRow(const PartChange& part, const DimensionChange& d, bool first) {
@@ -110,17 +132,15 @@ std::string WhatIfText(const std::vector<PartChange>& parts) {
     }
     for (const DimensionChange& d : part.dimensions) {
       if (d.Flipped()) {
-        text += fmt::format("part {}: {}: {} -> {}, {:.4f} -> {:.4f} mm\n", part.part, d.name,
-                            NameOf(d.recorded_verdict), NameOf(d.now_verdict), d.recorded_mm, d.now_mm);
+        text +=
+            fmt::format("part {}: {}: {} -> {}, {} -> {} mm\n", part.part, d.name, NameOf(d.recorded_verdict),
+                        NameOf(d.now_verdict), NumberText(d.recorded_mm, 4), NumberText(d.now_mm, 4));
       }
     }
   }
   text += fmt::format("{} of {} verdicts change\n", Flips(parts), parts.size());
-  for (const Largest& largest : LargestChanges(parts)) {
-    text += largest.change_mm == 0.0
-                ? fmt::format("  {}: every size as recorded\n", largest.name)
-                : fmt::format("  {}: largest change {:+.4f} mm (part {}), {} verdicts change\n", largest.name,
-                              largest.change_mm, largest.part, largest.flips);
+  for (const Summary& summary : Summaries(parts)) {
+    text += fmt::format("  {}: {}\n", summary.name, SummaryText(summary));
   }
   return text;
 }

@@ -82,5 +82,12 @@ TEST(WhatIf, ThePageShowsEveryPartAndEscapesWhatItIsTold) {
   EXPECT_THAT(page, Not(HasSubstr("<east>")));
 }
 
+TEST(WhatIf, ASizeThatIsNotDeterminedAnyMoreIsAChange) {
+  const std::string text =
+      WhatIfText(CompareVerdicts({Verdict(1, kOk, 10)}, {Verdict(1, kNone, std::nan(""))}));
+  EXPECT_THAT(text, HasSubstr("length: 1 sizes are not determined any more, 1 verdicts change\n"));
+  EXPECT_THAT(text, Not(HasSubstr("nan")));
+}
+
 }  // namespace
 }  // namespace forgescan
