@@ -8,9 +8,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <array>
 #include <csignal>
-#include <cstdio>
 #include <fstream>
 #include <regex>
 #include <sstream>
@@ -18,17 +16,6 @@
 namespace forgescan::testing {
 
 namespace fs = std::filesystem;
-
-CommandOutput Call(const std::string& command) {
-  CommandOutput output;
-  FILE* pipe = popen((command + " 2>&1").c_str(), "r");
-  std::array<char, 4096> buffer{};
-  while (std::fgets(buffer.data(), buffer.size(), pipe) != nullptr) {
-    output.text += buffer.data();
-  }
-  output.exit_code = WEXITSTATUS(pclose(pipe));
-  return output;
-}
 
 std::string ReadAll(const fs::path& path) {
   std::ifstream stream(path);

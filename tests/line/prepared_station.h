@@ -9,15 +9,10 @@
 #include <string>
 #include <vector>
 
+#include "tests/run_command.h"
+
 namespace forgescan::testing {
 
-struct CommandOutput {
-  int exit_code = -1;
-  std::string text;
-};
-
-// Standard output and error together.
-CommandOutput Call(const std::string& command);
 std::string ReadAll(const std::filesystem::path& path);
 
 // Makes FOLDER/station, the small virtual station with these replacements (regular expression -> text) in its

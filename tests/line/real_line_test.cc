@@ -12,30 +12,18 @@
 #include <nlohmann/json.hpp>
 #include <regex>
 
+#include "tests/run_command.h"
+
 namespace {
 
 namespace fs = std::filesystem;
+using forgescan::CommandOutput;
+using forgescan::RunCommand;
 using Json = nlohmann::json;
 
 // A fifth of the narrowest tolerance; images of 612 x 512 px alone cost up to 0.07 mm on a diameter (chords
 // of the curved surface between pixels).
 constexpr double kToleranceMm = 0.1;
-
-struct Output {
-  int exit_code = -1;
-  std::string text;
-};
-
-Output Call(const std::string& command) {
-  Output output;
-  FILE* pipe = popen((command + " 2>&1").c_str(), "r");
-  std::array<char, 4096> buffer{};
-  while (std::fgets(buffer.data(), buffer.size(), pipe) != nullptr) {
-    output.text += buffer.data();
-  }
-  output.exit_code = WEXITSTATUS(pclose(pipe));
-  return output;
-}
 
 std::string ReadAll(const fs::path& path) {
   std::ifstream stream(path);
@@ -62,9 +50,9 @@ class RealLine : public ::testing::TestWithParam<const char*> {
 };
 
 TEST_P(RealLine, InspectsAnAxle) {
-  const Output output =
-      Call(std::string(FORGESCAN_BIN_DIR) + "/forgescan inspect --scale-divisor 4 --station " +
-           (folder_ / "station").string() + " --out " + (folder_ / "runs").string());
+  const CommandOutput output =
+      RunCommand(std::string(FORGESCAN_BIN_DIR) + "/forgescan inspect --scale-divisor 4 --station " +
+                 (folder_ / "station").string() + " --out " + (folder_ / "runs").string());
   ASSERT_EQ(output.exit_code, 0) << output.text;
   std::smatch match;
   ASSERT_TRUE(std::regex_search(output.text, match, std::regex("\nreport (.+)\n$"))) << output.text;
@@ -106,9 +94,9 @@ INSTANTIATE_TEST_SUITE_P(Buffers, RealLine, ::testing::Values("104857600", "1064
 });
 
 TEST(Inspect, SaysWhatIsWrong) {
-  const Output output =
-      Call(std::string(FORGESCAN_BIN_DIR) + "/forgescan inspect --station " + FORGESCAN_SOURCE_DIR +
-           "/docs --out " + ::testing::TempDir() + "forgescan_line_wrong");
+  const CommandOutput output =
+      RunCommand(std::string(FORGESCAN_BIN_DIR) + "/forgescan inspect --station " + FORGESCAN_SOURCE_DIR +
+                 "/docs --out " + ::testing::TempDir() + "forgescan_line_wrong");
   EXPECT_NE(output.exit_code, 0);
   EXPECT_NE(output.text.find("station.toml: cannot be read"), std::string::npos) << output.text;
   fs::remove_all(::testing::TempDir() + "forgescan_line_wrong");

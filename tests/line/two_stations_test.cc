@@ -38,12 +38,12 @@ class TwoStations : public ::testing::Test {
     WriteSmallStation(base_, {{"silence_s = 30.0", "silence_s = 8.0\nstage_patience_s = 3.0"},
                               {"folder = \"../recordings\"", "folder = \"recordings\""}});
     const std::string tool = std::string(FORGESCAN_BIN_DIR) + "/forgescan";
-    const auto prepared = Call(tool + "-virtual-station prepare --scale-divisor 4 --station " +
-                               (base_ / "station").string() + " --run " + (base_ / "run").string());
+    const auto prepared = RunCommand(tool + "-virtual-station prepare --scale-divisor 4 --station " +
+                                     (base_ / "station").string() + " --run " + (base_ / "run").string());
     ASSERT_EQ(prepared.exit_code, 0) << prepared.text;
     const fs::path model = base_ / "run/station/model";
-    const auto imported = Call(tool + " model import " + (model / "axle.step").string() + " --out " +
-                               (model / "axle.bundle").string());
+    const auto imported = RunCommand(tool + " model import " + (model / "axle.step").string() + " --out " +
+                                     (model / "axle.bundle").string());
     ASSERT_EQ(imported.exit_code, 0) << imported.text;
     for (const int i : {0, 1}) {
       fs::copy(base_ / "run/station", Folder(i), fs::copy_options::recursive);
@@ -110,7 +110,7 @@ class TwoStations : public ::testing::Test {
   void Down() {
     for (const int i : {0, 1}) {
       const auto down =
-          Call(std::string(FORGESCAN_BIN_DIR) + "/forgescan station down " + Folder(i).string());
+          RunCommand(std::string(FORGESCAN_BIN_DIR) + "/forgescan station down " + Folder(i).string());
       EXPECT_EQ(down.exit_code, 0) << down.text;
       EXPECT_EQ(up_[static_cast<std::size_t>(i)]->Wait(30), 0) << up_[static_cast<std::size_t>(i)]->Text();
       EXPECT_EQ(LogOf(i).find("KILLED"), std::string::npos) << LogOf(i);
@@ -128,7 +128,7 @@ TEST_F(TwoStations, HearNothingOfEachOther) {
     EXPECT_THAT(ear->hashes, ::testing::ElementsAre(ear->hash)) << "a service of the other station was heard";
   }
   const auto status =
-      Call(std::string(FORGESCAN_BIN_DIR) + "/forgescan station status --json " + Folder(0).string());
+      RunCommand(std::string(FORGESCAN_BIN_DIR) + "/forgescan station status --json " + Folder(0).string());
   EXPECT_NE(status.exit_code, 0) << "there are no devices";
   const std::size_t begin = status.text.find("{\n"),
                     end = status.text.rfind("}\n");  // then the error's sentence
@@ -181,10 +181,11 @@ TEST_F(TwoStations, WhatIsKilledOrHangsInOneIsStartedAgainThere) {
 
 TEST_F(TwoStations, AStationThatIsUpIsNotStartedTwice) {
   const auto status =
-      Call(std::string(FORGESCAN_BIN_DIR) + "/forgescan station status " + Folder(0).string());
+      RunCommand(std::string(FORGESCAN_BIN_DIR) + "/forgescan station status " + Folder(0).string());
   EXPECT_THAT(status.text, HasSubstr("is not up"));
   Up();
-  const auto again = Call(std::string(FORGESCAN_BIN_DIR) + "/forgescan station up " + Folder(0).string());
+  const auto again =
+      RunCommand(std::string(FORGESCAN_BIN_DIR) + "/forgescan station up " + Folder(0).string());
   EXPECT_NE(again.exit_code, 0);
   EXPECT_THAT(again.text, HasSubstr("is up already"));
   Down();
@@ -272,16 +273,17 @@ TEST_F(TwoStations, WhatOutlivesItsSupervisorIsEndedBeforeTheNextStart) {
   std::ofstream(station.folder() / "station.toml", std::ios::app) << "[service.deaf]\n";
   const std::string up = (programs / "forgescan").string() + " station up " + station.folder().string();
 
-  Call(up + " > /dev/null 2>&1 &");
+  RunCommand(up + " > /dev/null 2>&1 &");
   ASSERT_TRUE(station.IsUp()) << station.Log();
   const ProcessId hung = ProcessId::Of(PidOfService(station.folder(), "deaf"));
   ASSERT_GT(hung.pid, 0);
   kill(std::stoi(station.File()), SIGKILL);
-  Call(up + " > /dev/null 2>&1 &");
+  RunCommand(up + " > /dev/null 2>&1 &");
   EXPECT_TRUE(station.IsUp(2)) << station.Log();
   EXPECT_FALSE(hung.Runs());
   EXPECT_THAT(station.Log(), HasSubstr("deaf: process " + std::to_string(hung.pid) + " hangs: KILLED"));
-  const auto down = Call((programs / "forgescan").string() + " station down " + station.folder().string());
+  const auto down =
+      RunCommand((programs / "forgescan").string() + " station down " + station.folder().string());
   EXPECT_EQ(down.exit_code, 1);
   EXPECT_THAT(down.text, HasSubstr("deaf had to be killed to stop"));
 }
@@ -306,8 +308,8 @@ TEST_F(TwoStations, WhatWasGivenUpOrFailedWhileItStoppedIsToldByAll) {
   for (int turn = 0; turn < 600 && station.File().find("fusion 0 0 0 1\n") == std::string::npos; ++turn) {
     poll(nullptr, 0, 50);
   }
-  const auto status =
-      Call(std::string(FORGESCAN_BIN_DIR) + "/forgescan station status --json " + station.folder().string());
+  const auto status = RunCommand(std::string(FORGESCAN_BIN_DIR) + "/forgescan station status --json " +
+                                 station.folder().string());
   const auto json =
       nlohmann::json::parse(status.text.substr(0, status.text.rfind("}\n") + 1), nullptr, false);
   ASSERT_FALSE(json.is_discarded()) << status.text;
@@ -330,8 +332,8 @@ TEST_F(TwoStations, WhatWasGivenUpOrFailedWhileItStoppedIsToldByAll) {
 TEST_F(TwoStations, AReaderOrATerminalThatGoesAwayLeavesTheOrderAsItIs) {
   const OneStation station(Folder(1), "alone", "");
   const std::string tool = std::string(FORGESCAN_BIN_DIR) + "/forgescan", code = (base_ / "code").string();
-  Call("{ { " + tool + " station up " + station.folder().string() + "; echo $? > " + code +
-       "; } | head -n 1; } > /dev/null 2>&1 &");
+  RunCommand("{ { " + tool + " station up " + station.folder().string() + "; echo $? > " + code +
+             "; } | head -n 1; } > /dev/null 2>&1 &");
   ASSERT_TRUE(station.IsUp()) << station.Log();
   kill(std::stoi(station.File()), SIGHUP);
   for (int turn = 0; turn < 1200 && ReadAll(code).empty(); ++turn) {

@@ -4,23 +4,20 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-#include <array>
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <sstream>
 #include <string>
 
+#include "tests/run_command.h"
+
 namespace {
 
 namespace fs = std::filesystem;
+using forgescan::CommandOutput;
+using forgescan::RunCommand;
 using ::testing::HasSubstr;
-
-struct Output {
-  int exit_code = -1;
-  std::string text;
-};
 
 class SetupHost : public ::testing::Test {
  protected:
@@ -30,19 +27,12 @@ class SetupHost : public ::testing::Test {
   }
   ~SetupHost() override { fs::remove_all(root_); }
 
-  Output Call(const std::string& arguments) const { return Run("setup-host " + arguments); }
-  static Output Run(const std::string& tool) {
-    Output output;
-    const std::string command = FORGESCAN_SOURCE_DIR "/tools/" + tool + " 2>&1";
-    FILE* pipe = popen(command.c_str(), "r");
-    std::array<char, 4096> buffer{};
-    while (std::fgets(buffer.data(), buffer.size(), pipe) != nullptr) {
-      output.text += buffer.data();
-    }
-    output.exit_code = WEXITSTATUS(pclose(pipe));
-    return output;
+  CommandOutput Call(const std::string& arguments) const { return Run("setup-host " + arguments); }
+  static CommandOutput Run(const std::string& tool) {
+    const std::string command = FORGESCAN_SOURCE_DIR "/tools/" + tool;
+    return RunCommand(command);
   }
-  Output CallOnRoot(const std::string& option = "") const {
+  CommandOutput CallOnRoot(const std::string& option = "") const {
     return Call(option + " --root " + root_.string());
   }
   std::string Read(const char* path) const {
@@ -54,18 +44,18 @@ class SetupHost : public ::testing::Test {
 };
 
 TEST_F(SetupHost, WritesEveryFileOnceAndChecksIt) {
-  const Output before = CallOnRoot("--check");
+  const CommandOutput before = CallOnRoot("--check");
   EXPECT_EQ(before.exit_code, 1);
   EXPECT_THAT(before.text, HasSubstr("missing: /etc/sysctl.d/60-forgescan.conf"));
   EXPECT_TRUE(fs::is_empty(root_)) << "--check wrote something";
 
-  const Output first = CallOnRoot();
+  const CommandOutput first = CallOnRoot();
   EXPECT_EQ(first.exit_code, 0) << first.text;
   EXPECT_THAT(first.text, HasSubstr("written: /etc/sysctl.d/60-forgescan.conf"));
   EXPECT_THAT(Read("etc/sysctl.d/60-forgescan.conf"), HasSubstr("net.core.rmem_max = 134217728\n"));
   EXPECT_THAT(Read("etc/systemd/system/forgescan-route.service"), HasSubstr("239.255.76.67/32 dev lo\n"));
 
-  const Output second = CallOnRoot();
+  const CommandOutput second = CallOnRoot();
   EXPECT_EQ(second.exit_code, 0);
   EXPECT_EQ(second.text, "") << "it wrote again what was there";
   EXPECT_EQ(CallOnRoot("--check").exit_code, 0);
@@ -74,7 +64,7 @@ TEST_F(SetupHost, WritesEveryFileOnceAndChecksIt) {
 TEST_F(SetupHost, MendsAFileThatWasChanged) {
   ASSERT_EQ(CallOnRoot().exit_code, 0);
   std::ofstream(root_ / "etc/sysctl.d/60-forgescan.conf") << "net.core.rmem_max = 1\n";
-  const Output check = CallOnRoot("--check");
+  const CommandOutput check = CallOnRoot("--check");
   EXPECT_EQ(check.exit_code, 1);
   EXPECT_EQ(check.text, "missing: /etc/sysctl.d/60-forgescan.conf\n");
   EXPECT_EQ(CallOnRoot().text, "written: /etc/sysctl.d/60-forgescan.conf\n");
@@ -86,7 +76,7 @@ TEST_F(SetupHost, EnablesTheRouteForTheNextBoot) {
   EXPECT_THAT(CallOnRoot().text, HasSubstr("enabled: forgescan-route.service\n"));
   EXPECT_EQ(fs::read_symlink(root_ / link), "/etc/systemd/system/forgescan-route.service");
   fs::remove(root_ / link);
-  const Output check = CallOnRoot("--check");
+  const CommandOutput check = CallOnRoot("--check");
   EXPECT_EQ(check.exit_code, 1);
   EXPECT_THAT(check.text, HasSubstr("forgescan-route.service is not enabled"));
   EXPECT_EQ(CallOnRoot().text, "enabled: forgescan-route.service\n");
@@ -129,7 +119,7 @@ TEST_F(Spy, LeavesTheReceiveBufferOutOfTheAddress) {
 }
 
 TEST_F(Spy, NamesAStationThatIsNotThere) {
-  const Output none = Run("spy --address " + root_.string());
+  const CommandOutput none = Run("spy --address " + root_.string());
   EXPECT_EQ(none.exit_code, 2);
   EXPECT_THAT(none.text, HasSubstr("station.toml"));
 }

@@ -6,9 +6,7 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -16,6 +14,7 @@
 
 #include "services/common/geometry/cloud_io.h"
 #include "services/common/service/station.h"
+#include "tests/run_command.h"
 #include "tools/forgescan/station/station_services.h"
 
 namespace forgescan {
@@ -23,11 +22,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
-
-struct Output {
-  int exit_code = -1;
-  std::string text;  // standard output and error
-};
 
 class Cli : public ::testing::Test {
  protected:
@@ -38,21 +32,14 @@ class Cli : public ::testing::Test {
   void TearDown() override { fs::remove_all(folder_); }
 
   // What `arguments` redirect themselves is not in the output.
-  Output Call(const std::string& arguments) const {
-    Output output;
+  CommandOutput Call(const std::string& arguments) const {
     const std::string command =
-        "cd " + folder_.string() + " && " + FORGESCAN_BIN_DIR + "/forgescan 2>&1 " + arguments;
-    FILE* pipe = popen(command.c_str(), "r");
-    std::array<char, 4096> buffer{};
-    while (std::fgets(buffer.data(), buffer.size(), pipe) != nullptr) {
-      output.text += buffer.data();
-    }
-    output.exit_code = WEXITSTATUS(pclose(pipe));
-    return output;
+        "cd " + folder_.string() + " && " + FORGESCAN_BIN_DIR + "/forgescan " + arguments;
+    return RunCommand(command);
   }
   // Fails with one sentence that contains `what`, and writes none of the files.
   void ExpectRefusal(const std::string& arguments, const std::string& what) const {
-    const Output output = Call(arguments);
+    const CommandOutput output = Call(arguments);
     EXPECT_NE(output.exit_code, 0) << arguments;
     EXPECT_NE(output.text.find(what), std::string::npos) << output.text;
     EXPECT_EQ(std::count(output.text.begin(), output.text.end(), '\n'), 1) << output.text;
@@ -88,7 +75,7 @@ std::vector<Eigen::Vector3f> HalfCylinder() {
 
 TEST_F(Cli, FitsACylinder) {
   WriteCloud("c.ply", HalfCylinder());
-  const Output output = Call("fit cylinder --cloud c.ply --json f.json");
+  const CommandOutput output = Call("fit cylinder --cloud c.ply --json f.json");
   ASSERT_EQ(output.exit_code, 0) << output.text;
   const Json fit = ReadJson("f.json");
   EXPECT_NEAR(fit["radius_mm"].get<double>(), 44.75,
@@ -105,7 +92,7 @@ TEST_F(Cli, FitsAPlaneNearAPlace) {
     points.emplace_back(static_cast<float>(i % 100), static_cast<float>(i / 100), i % 100 < 50 ? 7.F : 300.F);
   }
   WriteCloud("c.ply", points);
-  const Output output = Call("fit plane --cloud c.ply --near 20,50,7 --radius 15 --json f.json");
+  const CommandOutput output = Call("fit plane --cloud c.ply --near 20,50,7 --radius 15 --json f.json");
   ASSERT_EQ(output.exit_code, 0) << output.text;
   const Json fit = ReadJson("f.json");
   EXPECT_NEAR(std::abs(fit["normal"][2].get<double>()), 1.0, 1e-9);
@@ -218,7 +205,7 @@ TEST_F(Cli, RegistersAPart) {
   std::ofstream(folder_ / "block.stl") << BlockStl();
   WriteCloud("scan.ply", BlockScan({1.5, -0.8, 0.6}));
   const std::string call = "register --scan scan.ply --model block.stl --spacing-mm 2 ";
-  const Output output = Call(call + "--out pose.txt --json r.json --threads 0");
+  const CommandOutput output = Call(call + "--out pose.txt --json r.json --threads 0");
   ASSERT_EQ(output.exit_code, 0) << output.text;
   const Json result = ReadJson("r.json");
   const Eigen::Vector3d expected(-1.5, 0.8, -0.6);
@@ -257,7 +244,7 @@ TEST_F(Cli, RegisterRefusesWhatItCannotTrust) {
 
 TEST_F(Cli, ImportsAModelButNotOverItself) {
   std::ofstream(folder_ / "block.stl") << BlockStl();
-  const Output output = Call("model import block.stl --spacing-mm 4");
+  const CommandOutput output = Call("model import block.stl --spacing-mm 4");
   ASSERT_EQ(output.exit_code, 0) << output.text;
   EXPECT_NE(output.text.find("12 triangles"), std::string::npos) << output.text;
   ExpectRefusal("model import block.bundle", "is both input and output");
@@ -275,7 +262,7 @@ TEST_F(Cli, ReconstructNamesWhatIsMissing) {
 }
 
 TEST_F(Cli, AnUnknownCommandIsAUsageError) {
-  const Output output = Call("melt");
+  const CommandOutput output = Call("melt");
   EXPECT_NE(output.exit_code, 0);
   EXPECT_NE(output.text.find("melt is no command"), std::string::npos) << output.text;
   EXPECT_NE(Call("").text.find("subcommand is required"), std::string::npos);
@@ -286,7 +273,7 @@ TEST_F(Cli, NumbersOutsideTheirRangeAreUsageErrors) {
   for (const char* call :
        {"inspect --takt nan", "inspect --takt inf", "inspect --patience nan",
         "model import block.stl --chord-error-mm inf", "fit cylinder --cloud c.ply --min-points -1"}) {
-    const Output output = Call(call);
+    const CommandOutput output = Call(call);
     EXPECT_NE(output.exit_code, 0) << call;
     EXPECT_NE(output.text.find("is not a number from"), std::string::npos) << output.text;
   }

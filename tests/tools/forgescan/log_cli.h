@@ -3,40 +3,26 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
-#include <array>
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
 
 #include "services/common/log/log_reader.h"
+#include "tests/run_command.h"
 #include "tests/tools/forgescan/test_recording.h"
 
 namespace forgescan {
-
-struct Output {
-  int exit_code = -1;
-  std::string text;  // standard output and error
-};
 
 class LogCli : public ::testing::Test {
  protected:
   void SetUp() override { std::filesystem::create_directories(folder_); }
   void TearDown() override { std::filesystem::remove_all(folder_); }
 
-  Output Call(const std::string& arguments) const {
-    Output output;
+  CommandOutput Call(const std::string& arguments) const {
     const std::string command =
-        "cd " + folder_.string() + " && " + FORGESCAN_BIN_DIR + "/forgescan log 2>&1 " + arguments;
-    FILE* pipe = popen(command.c_str(), "r");
-    std::array<char, 4096> buffer{};
-    while (std::fgets(buffer.data(), buffer.size(), pipe) != nullptr) {
-      output.text += buffer.data();
-    }
-    output.exit_code = WEXITSTATUS(pclose(pipe));
-    return output;
+        "cd " + folder_.string() + " && " + FORGESCAN_BIN_DIR + "/forgescan log " + arguments;
+    return RunCommand(command);
   }
   std::string Path(const std::string& name) const { return folder_ / name; }
   void Write(const TestRecording& recording, const std::string& name = "a.log") const {
@@ -50,7 +36,7 @@ class LogCli : public ::testing::Test {
     file << bytes;
   }
   void ExpectFinding(const std::string& what) const {
-    const Output output = Call("check a.log");
+    const CommandOutput output = Call("check a.log");
     EXPECT_EQ(output.exit_code, 1) << output.text;
     EXPECT_THAT(output.text, ::testing::HasSubstr(what));
   }

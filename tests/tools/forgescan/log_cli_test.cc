@@ -14,7 +14,7 @@ using Json = nlohmann::json;
 
 TEST_F(LogCli, InfoStartsWithWhatARecordingHolds) {
   Write(TestRecording::Make());
-  const Output output = Call("info --json a.log a.log");
+  const CommandOutput output = Call("info --json a.log a.log");
   ASSERT_EQ(output.exit_code, 0) << output.text;
   const Json both = Json::parse(output.text);
   ASSERT_EQ(both.size(), 2u);
@@ -30,7 +30,7 @@ TEST_F(LogCli, InfoStartsWithWhatARecordingHolds) {
   EXPECT_EQ(frames["events"], 3);
   EXPECT_NEAR(frames["rate_hz"].get<double>(), 2.5, 1e-9);  // one each 4 events of 0.1 s
   EXPECT_EQ(frames["types"][0]["type"], "fsmsg.frame_t");
-  const Output text = Call("info a.log");
+  const CommandOutput text = Call("info a.log");
   EXPECT_THAT(text.text, HasSubstr("recording of part 7 at station test, version 1.2.3"));
   EXPECT_THAT(text.text, HasSubstr("closed: the part was sorted; verdict OK; 0 gaps"));
 }
@@ -38,7 +38,7 @@ TEST_F(LogCli, InfoStartsWithWhatARecordingHolds) {
 TEST_F(LogCli, InfoOfARealLog) {
   const auto data = RealData("lcm-log");
   if (!data) GTEST_SKIP() << "lcm-log" << kNoRealData;
-  const Output output = Call("info --json " + (*data / "convex.log").string());
+  const CommandOutput output = Call("info --json " + (*data / "convex.log").string());
   ASSERT_EQ(output.exit_code, 0) << output.text;
   const Json info = Json::parse(output.text)[0];
   EXPECT_EQ(info["events"], 5714);
@@ -59,7 +59,7 @@ TEST_F(LogCli, InfoOfARealLog) {
 
 TEST_F(LogCli, CheckAcceptsOnlyWhatIsWholeAndComplete) {
   Write(TestRecording::Make());
-  const Output output = Call("check a.log");
+  const CommandOutput output = Call("check a.log");
   EXPECT_EQ(output.exit_code, 0) << output.text;
   EXPECT_EQ(output.text, "a.log: whole and complete, 16 events\n");
 }
@@ -146,7 +146,7 @@ TEST_F(LogCli, CheckFindsDamage) {
   Patch(log->entries()[5].offset, "bad!");
   ExpectFinding(fmt::format("byte {}: ", log->entries()[5].offset));
   ExpectFinding("bytes are damaged: an event with a bad sync word");
-  const Output two = Call("check a.log nothing.log");
+  const CommandOutput two = Call("check a.log nothing.log");
   EXPECT_EQ(two.exit_code, 1);
   EXPECT_THAT(two.text, HasSubstr("nothing.log: No such file"));
   EXPECT_THAT(two.text, HasSubstr("in 2 of 2 logs"));
@@ -161,7 +161,7 @@ TEST_F(LogCli, RepairKeepsWhatIsUndamagedAndSaysWhatIsNot) {
   Patch(log->entries()[bad_sync].offset, "bad!");
   Patch(log->entries()[bad_pixel + 1].offset - 1, "x");
   const auto before = fs::last_write_time(Path("a.log"));
-  const Output output = Call("repair a.log --out b.log");
+  const CommandOutput output = Call("repair a.log --out b.log");
   ASSERT_EQ(output.exit_code, 0) << output.text;
   EXPECT_THAT(output.text, HasSubstr("an event with a bad sync word"));
   EXPECT_THAT(output.text, HasSubstr("FRAME_RIGHT: a message of 665 bytes has a wrong CRC-32"));
@@ -178,7 +178,7 @@ TEST_F(LogCli, RepairKeepsWhatIsUndamagedAndSaysWhatIsNot) {
     EXPECT_EQ(entry.utime, recording.events[i].utime);
     EXPECT_EQ(*repaired->Read(entry), recording.events[i].message);
   }
-  const Output check = Call("check b.log");  // it is whole, and says that it is not complete
+  const CommandOutput check = Call("check b.log");  // it is whole, and says that it is not complete
   EXPECT_EQ(check.exit_code, 1);
   EXPECT_THAT(check.text, HasSubstr("FRAME_LEFT: the closing event names a gap"));
   EXPECT_THAT(check.text, HasSubstr("of a.log were damaged: an event with a bad sync word"));
@@ -193,10 +193,10 @@ TEST_F(LogCli, RepairGivesALeftOverItsName) {
   recording.events.pop_back();
   Write(recording);
   fs::rename(Path("a.log"), Path("b.log.part"));
-  const Output output = Call("repair b.log.part --out b.log");
+  const CommandOutput output = Call("repair b.log.part --out b.log");
   ASSERT_EQ(output.exit_code, 0) << output.text;
   EXPECT_EQ(Files("."), (std::vector<std::string>{"b.log", "b.log.part"}));
-  const Output check = Call("check b.log");
+  const CommandOutput check = Call("check b.log");
   EXPECT_THAT(check.text, HasSubstr("b.log.part has no closing event"));
   EXPECT_EQ(check.text.find("VERDICT"), std::string::npos) << check.text;
 }
@@ -214,7 +214,7 @@ TEST_F(LogCli, WhatARepairLeftOutIsNamedOnceAChannelWithACount) {
   ASSERT_EQ(Call("repair a.log --out b.log").exit_code, 0);
   const auto channels = Channels("b.log");
   EXPECT_EQ(std::count(channels.begin(), channels.end(), "SHORT"), 0);
-  const Output check = Call("check b.log");
+  const CommandOutput check = Call("check b.log");
   EXPECT_THAT(check.text,
               HasSubstr("SERVICE_STATE: the closing event names a gap: 20000 messages were left out: they "
                         "do not decode as fsmsg.service_state_t"));
@@ -226,12 +226,12 @@ TEST_F(LogCli, WhatARepairLeftOutIsNamedOnceAChannelWithACount) {
 
 TEST_F(LogCli, InfoAndCheckGoOnAfterALogThatCannotBeRead) {
   Write(TestRecording::Make());
-  const Output text = Call("info a.log nothing.log a.log");
+  const CommandOutput text = Call("info a.log nothing.log a.log");
   EXPECT_EQ(text.exit_code, 1);
   EXPECT_THAT(text.text, HasSubstr("nothing.log: No such file"));
   const std::size_t first = text.text.find("recording of part 7");
   EXPECT_NE(text.text.find("recording of part 7", first + 1), std::string::npos) << text.text;
-  const Output json = Call("info --json nothing.log a.log none.log 2>/dev/null");
+  const CommandOutput json = Call("info --json nothing.log a.log none.log 2>/dev/null");
   EXPECT_EQ(json.exit_code, 1);
   EXPECT_EQ(Json::parse(json.text).size(), 1u);
 }
@@ -245,7 +245,7 @@ TEST_F(LogCli, WhatALogSaysDoesNotReachTheTerminalRaw) {
   recording.Close({gap});
   Write(recording);
   for (const char* command : {"info a.log", "check a.log"}) {
-    const Output output = Call(command);
+    const CommandOutput output = Call(command);
     EXPECT_THAT(output.text, HasSubstr("gone\\x0A\\x1B[2Ja.log: whole and complete \xC3\xB6\\xFF\\xC2\\x9B"))
         << command;
   }
@@ -296,7 +296,7 @@ TEST_F(LogCli, CutRefusesWhatItCannotDo) {
       {"--part 8", "none of its 16 events"},
       {"--from +100", "none of its 16 events"}};
   for (const auto& [option, sentence] : wrong) {
-    const Output output = Call("cut a.log --out b.log " + option);
+    const CommandOutput output = Call("cut a.log --out b.log " + option);
     EXPECT_EQ(output.exit_code, 1) << option;
     EXPECT_THAT(output.text, HasSubstr(sentence));
   }

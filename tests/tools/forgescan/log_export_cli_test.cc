@@ -16,7 +16,7 @@ using LogExportCli = LogCli;
 TEST_F(LogExportCli, ExportMakesFilesOfEverything) {
   const TestRecording recording = TestRecording::Make();
   Write(recording);
-  const Output output = Call("export a.log --out b/");
+  const CommandOutput output = Call("export a.log --out b/");
   ASSERT_EQ(output.exit_code, 0) << output.text;
   EXPECT_EQ(Files("b"),
             (std::vector<std::string>{"7_0_0_left_1.png", "7_0_0_right_1.png", "7_1_0_left_2.png",
@@ -49,7 +49,7 @@ TEST_F(LogExportCli, ExportSaysWhatItHadToLeaveOut) {
   TestRecording recording = TestRecording::Make();
   recording.events[recording.Find("VIEW_CLOUD", 1)].message.back() ^= 1;
   Write(recording);
-  const Output output = Call("export a.log --out b");
+  const CommandOutput output = Call("export a.log --out b");
   EXPECT_EQ(output.exit_code, 1);
   EXPECT_THAT(output.text, HasSubstr("VIEW_CLOUD: a message of"));
   EXPECT_THAT(output.text, HasSubstr("left out: 1 messages or clouds, 0 damaged stretches"));
@@ -63,7 +63,7 @@ TEST_F(LogExportCli, ExportSaysWhatItHadToLeaveOut) {
 
 TEST_F(LogExportCli, ExportsToMcap) {
   Write(TestRecording::Make());
-  const Output output = Call("export a.log --mcap b.mcap");
+  const CommandOutput output = Call("export a.log --mcap b.mcap");
   ASSERT_EQ(output.exit_code, 0) << output.text;
   EXPECT_EQ(output.text, "b.mcap: 16 messages\n");
   EXPECT_THAT(Call("export a.log --mcap b.mcap").text, HasSubstr("b.mcap: exists already"));
@@ -74,7 +74,7 @@ TEST_F(LogExportCli, BothExportsAreMadeOfADamagedLog) {
   TestRecording recording = TestRecording::Make();
   recording.events[recording.Find("VIEW_CLOUD", 1)].message.back() ^= 1;
   Write(recording);
-  const Output output = Call("export a.log --out b --mcap b.mcap");
+  const CommandOutput output = Call("export a.log --out b --mcap b.mcap");
   EXPECT_EQ(output.exit_code, 1);
   EXPECT_THAT(output.text, HasSubstr("b.mcap: 15 messages"));
   EXPECT_EQ(Files("."), (std::vector<std::string>{"a.log", "b", "b.mcap"}));
@@ -91,7 +91,7 @@ TEST_F(LogExportCli, AnImageThatIsNoneIsLeftOutAndTheRestExported) {
   frame.size = 2'000'000;
   recording.AddToStream("FRAME_LEFT", frame);
   Write(recording);
-  const Output output = Call("export a.log --out b --mcap b.mcap");
+  const CommandOutput output = Call("export a.log --out b --mcap b.mcap");
   EXPECT_EQ(output.exit_code, 1);
   EXPECT_THAT(output.text, HasSubstr("an image of 2000000 x 1 px cannot be written as PNG"));
   EXPECT_THAT(output.text, HasSubstr("left out: 1 messages or clouds"));
@@ -108,7 +108,7 @@ TEST_F(LogExportCli, ChannelsWithNamesInUtf8) {
   TestRecording recording = TestRecording::Make();
   recording.events.insert(recording.events.end() - 1, {"Kamera_\xC3\xB6", recording.Now(), Bytes(20, 1)});
   Write(recording);
-  const Output output = Call("export a.log --out b --mcap b.mcap");
+  const CommandOutput output = Call("export a.log --out b --mcap b.mcap");
   EXPECT_EQ(output.exit_code, 0) << output.text;
   std::ifstream file(folder_ / "b/Kamera___.jsonl");
   EXPECT_EQ(Json::parse(file)["channel"], "Kamera_\xC3\xB6");

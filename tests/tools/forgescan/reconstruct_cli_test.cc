@@ -4,8 +4,6 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-#include <array>
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -13,6 +11,7 @@
 
 #include "services/common/geometry/cloud_io.h"
 #include "tests/common/real_data.h"
+#include "tests/run_command.h"
 
 namespace forgescan {
 namespace {
@@ -21,11 +20,6 @@ namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 
 const fs::path kBoard = RealData("real-fringe-plane").value_or("");
-
-struct Output {
-  int exit_code = -1;
-  std::string text;  // standard output and error
-};
 
 class ReconstructCli : public ::testing::Test {
  protected:
@@ -45,19 +39,11 @@ class ReconstructCli : public ::testing::Test {
   void TearDown() override { fs::remove_all(folder_); }
 
   // left, right: folders of the board's data; the outputs are options of their own.
-  Output Call(const std::string& left, const std::string& right, const std::string& outputs) const {
+  CommandOutput Call(const std::string& left, const std::string& right, const std::string& outputs) const {
     const std::string command = fmt::format(
-        "cd {} && {}/forgescan reconstruct --left {} --right {} --calibration {} --pattern pattern.toml {} "
-        "2>&1",
+        "cd {} && {}/forgescan reconstruct --left {} --right {} --calibration {} --pattern pattern.toml {}",
         folder_.string(), FORGESCAN_BIN_DIR, left, right, (kBoard / "stereo_params.yaml").string(), outputs);
-    Output output;
-    FILE* pipe = popen(command.c_str(), "r");
-    std::array<char, 4096> buffer{};
-    while (std::fgets(buffer.data(), buffer.size(), pipe) != nullptr) {
-      output.text += buffer.data();
-    }
-    output.exit_code = WEXITSTATUS(pclose(pipe));
-    return output;
+    return RunCommand(command);
   }
   void ExpectOnlyThePattern() const {
     for (const auto& entry : fs::directory_iterator(folder_)) {
@@ -72,7 +58,7 @@ class ReconstructCli : public ::testing::Test {
 };
 
 TEST_F(ReconstructCli, WritesCloudAndFigures) {
-  const Output output = Call(left_, right_, "--out c.ply --json q.json");
+  const CommandOutput output = Call(left_, right_, "--out c.ply --json q.json");
   ASSERT_EQ(output.exit_code, 0) << output.text;
   const auto cloud = ReadPointCloud(folder_ / "c.ply");
   ASSERT_TRUE(cloud.ok()) << cloud.error().message;
@@ -89,21 +75,21 @@ TEST_F(ReconstructCli, WritesCloudAndFigures) {
 TEST_F(ReconstructCli, ARefusalRemovesTheOldResult) {
   std::ofstream(folder_ / "c.ply") << "of yesterday";
   std::ofstream(folder_ / "q.json") << "of yesterday";
-  const Output output = Call(right_, left_, "--out c.ply --json q.json");
+  const CommandOutput output = Call(right_, left_, "--out c.ply --json q.json");
   EXPECT_NE(output.exit_code, 0);
   EXPECT_THAT(output.text, HasSubstr("exchanged or mirrored"));
   ExpectOnlyThePattern();
 }
 
 TEST_F(ReconstructCli, WhenOneFileCannotBeWrittenThereIsNone) {
-  const Output output = Call(left_, right_, "--out c.ply --json /dev/full");
+  const CommandOutput output = Call(left_, right_, "--out c.ply --json /dev/full");
   EXPECT_NE(output.exit_code, 0);
   EXPECT_THAT(output.text, HasSubstr("/dev/full"));
   ExpectOnlyThePattern();
 }
 
 TEST_F(ReconstructCli, OutputsMustNotBeInputsOrEachOther) {
-  const Output over_input = Call(left_, right_, "--out ./pattern.toml");
+  const CommandOutput over_input = Call(left_, right_, "--out ./pattern.toml");
   EXPECT_NE(over_input.exit_code, 0);
   EXPECT_THAT(over_input.text, HasSubstr("is both input and output"));
   EXPECT_GT(fs::file_size(folder_ / "pattern.toml"), 100U);

@@ -5,15 +5,14 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <csignal>
-#include <cstdio>
 #include <cstdlib>
 #include <fstream>
 #include <functional>
 #include <iterator>
 
 #include "services/common/log/log_reader.h"
+#include "tests/run_command.h"
 #include "tests/tools/forgescan/replay/written_recording.h"
 
 namespace forgescan {
@@ -28,11 +27,6 @@ using testing::TestFolder;
 constexpr const char* kSample = FORGESCAN_SOURCE_DIR "/logs/sample/axle.lcmlog";
 constexpr const char* kPlay = "play --speed 100 --bus 'udpm://239.255.76.67:7681?ttl=0' ";
 
-struct Output {
-  int exit_code = -1;
-  std::string text;  // standard output and error
-};
-
 struct Event {
   std::string channel;
   std::int64_t utime = 0;
@@ -45,18 +39,10 @@ class ReplayCli : public ::testing::Test {
   // Whatever a command had to say, it leaves nothing in the folder for temporary files.
   void TearDown() override { EXPECT_TRUE(fs::is_empty(Scratch())); }
 
-  Output Call(const std::string& arguments) const {
-    Output output;
+  CommandOutput Call(const std::string& arguments) const {
     const std::string command = "cd " + folder_.path().string() + " && TMPDIR=" + Scratch() + " " +
-                                FORGESCAN_BIN_DIR + "/forgescan " + arguments + " 2>&1";
-    FILE* pipe = popen(command.c_str(), "r");
-    std::array<char, 4096> buffer{};
-    while (std::fgets(buffer.data(), buffer.size(), pipe) != nullptr) {
-      output.text += buffer.data();
-    }
-    const int status = pclose(pipe);
-    output.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-    return output;
+                                FORGESCAN_BIN_DIR + "/forgescan " + arguments;
+    return RunCommand(command);
   }
   std::string Scratch() const { return folder_ / "scratch"; }
 
@@ -83,7 +69,7 @@ class ReplayCli : public ::testing::Test {
     return *found;
   }
   void ExpectRefused(const std::string& arguments, const std::string& why) const {
-    const Output output = Call(arguments);
+    const CommandOutput output = Call(arguments);
     EXPECT_EQ(output.exit_code, 1) << output.text;
     EXPECT_THAT(output.text, HasSubstr(why)) << arguments;
     EXPECT_THAT(output.text, Not(HasSubstr("verdicts change"))) << "it computes nothing";
@@ -98,14 +84,14 @@ class ReplayCli : public ::testing::Test {
 };
 
 TEST_F(ReplayCli, ReplaysTheSampleAndKeepsItsReports) {
-  const Output output = Call("replay --service report --results kept" + sample_);
+  const CommandOutput output = Call("replay --service report --results kept" + sample_);
   EXPECT_EQ(output.exit_code, 0) << output.text;
   EXPECT_THAT(output.text, HasSubstr("VERDICT                   1          0        0      0"));
   EXPECT_TRUE(fs::exists(folder_ / "kept/history.sqlite"));
 }
 
 TEST_F(ReplayCli, AChangedSettingGivesVerdictsAndAPage) {
-  const Output output =
+  const CommandOutput output =
       Call("replay --service report --set report.deviation_scale_mm=0.25 --report page.html" + sample_);
   EXPECT_EQ(output.exit_code, 0) << output.text;
   EXPECT_THAT(output.text, HasSubstr("changed: report.deviation_scale_mm = 0.25"));
@@ -126,7 +112,7 @@ TEST_F(ReplayCli, RefusesAChangeThatChangesNothing) {
 }
 
 TEST_F(ReplayCli, SaysThatNoVerdictsAreComputedWithoutTheReport) {
-  const Output output = Call("replay --service fusion --set fusion.view_timeout_s=61" + sample_);
+  const CommandOutput output = Call("replay --service fusion --set fusion.view_timeout_s=61" + sample_);
   EXPECT_EQ(output.exit_code, 0) << output.text;
   EXPECT_THAT(output.text, HasSubstr("no verdicts are computed"));
   EXPECT_THAT(output.text, Not(HasSubstr("none")));
@@ -136,11 +122,11 @@ TEST_F(ReplayCli, ARecordingThatLacksAMessageIsNotWhole) {
   Change([](auto& events) {
     std::erase_if(events, [](const auto& event) { return event.channel == "PART_SORTED"; });
   });
-  const Output output = Call("replay --service report changed.lcmlog");
+  const CommandOutput output = Call("replay --service report changed.lcmlog");
   EXPECT_EQ(output.exit_code, 1) << output.text;
   EXPECT_THAT(output.text, HasSubstr("recording: changed.lcmlog: PART_SORTED the closing event counts"));
   EXPECT_THAT(output.text, HasSubstr("what there is replays equally, but the recording is not whole"));
-  const Output what_if =
+  const CommandOutput what_if =
       Call("replay --service report --set report.deviation_scale_mm=0.25 --report page.html changed.lcmlog");
   EXPECT_EQ(what_if.exit_code, 1) << what_if.text;
   EXPECT_THAT(what_if.text, HasSubstr("the recording is not whole"));
@@ -150,13 +136,14 @@ TEST_F(ReplayCli, ARecordingThatLacksAMessageIsNotWhole) {
 TEST_F(ReplayCli, AWrongBitInAResultIsNamedByReplayAndLeftOutByPlay) {
   Change([](auto& events) { First(events, "VERDICT").message.back() ^= 1; });
   for (const char* options : {"", "--report page.html "}) {
-    const Output output = Call(std::string("replay --service report ") + options + "changed.lcmlog");
+    const CommandOutput output = Call(std::string("replay --service report ") + options + "changed.lcmlog");
     EXPECT_EQ(output.exit_code, 1) << output.text;
     EXPECT_THAT(output.text, HasSubstr("changed input: changed.lcmlog, event"));
     EXPECT_THAT(output.text, HasSubstr("VERDICT                   0          1        0      0"));
     EXPECT_THAT(output.text, HasSubstr("1 recorded messages are not as they were sent"));
   }
-  const Output played = Call(std::string(kPlay) + "--channel VERDICT --channel PART_SORTED changed.lcmlog");
+  const CommandOutput played =
+      Call(std::string(kPlay) + "--channel VERDICT --channel PART_SORTED changed.lcmlog");
   EXPECT_EQ(played.exit_code, 1) << played.text;
   EXPECT_THAT(played.text, HasSubstr("left out: changed.lcmlog, event"));
   EXPECT_THAT(played.text, HasSubstr("1 messages played"));
@@ -164,14 +151,14 @@ TEST_F(ReplayCli, AWrongBitInAResultIsNamedByReplayAndLeftOutByPlay) {
 
 TEST_F(ReplayCli, AWrongBitInAFileOfTheStationIsNamed) {
   Change([](auto& events) { First(events, "RECORDED_FILE").message.back() ^= 1; });
-  const Output output = Call("replay --service report changed.lcmlog");
+  const CommandOutput output = Call("replay --service report changed.lcmlog");
   EXPECT_EQ(output.exit_code, 1) << output.text;
   EXPECT_THAT(output.text, HasSubstr("RECORDED_FILE station.toml has the CRC-32"));
 }
 
 TEST_F(ReplayCli, AWrongBitInATimeIsNamedAndNotWaitedFor) {
   Change([](auto& events) { First(events, "SCAN_COMPLETE").utime ^= std::int64_t{1} << 52; });
-  const Output output = Call("replay --service report changed.lcmlog");
+  const CommandOutput output = Call("replay --service report changed.lcmlog");
   EXPECT_EQ(output.exit_code, 1) << output.text;
   EXPECT_THAT(output.text, HasSubstr("is minutes off"));
   EXPECT_THAT(output.text, HasSubstr("VERDICT                   1          0        0      0"));
@@ -182,10 +169,10 @@ TEST_F(ReplayCli, SaysWhetherARecordingIsCutOffOrHoldsNoResult) {
     const Event& verdict = First(events, "VERDICT");
     events.erase(events.begin() + (&verdict - events.data()), events.end());
   });
-  const Output cut = Call("replay --service registration --service report changed.lcmlog");
+  const CommandOutput cut = Call("replay --service registration --service report changed.lcmlog");
   EXPECT_EQ(cut.exit_code, 1) << cut.text;
   EXPECT_THAT(cut.text, HasSubstr("what there is replays equally, but the recording is not whole"));
-  const Output nothing = Call("replay --service report changed.lcmlog");
+  const CommandOutput nothing = Call("replay --service report changed.lcmlog");
   EXPECT_EQ(nothing.exit_code, 1) << nothing.text;
   EXPECT_THAT(nothing.text, HasSubstr("there is nothing to compare"));
 }
@@ -213,7 +200,7 @@ TEST_F(ReplayCli, AnInterruptedReplayLeavesNothingBehind) {  // TearDown() looks
 }
 
 TEST_F(ReplayCli, PlaysWhatIsAskedForOrSaysThatItIsNotThere) {
-  const Output played = Call(std::string(kPlay) + "--channel VERDICT" + sample_);
+  const CommandOutput played = Call(std::string(kPlay) + "--channel VERDICT" + sample_);
   EXPECT_EQ(played.exit_code, 0) << played.text;
   EXPECT_THAT(played.text, HasSubstr("1 messages played"));
   ExpectRefused(std::string(kPlay) + "--channel NOSUCH" + sample_,

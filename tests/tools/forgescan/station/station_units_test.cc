@@ -5,12 +5,11 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-#include <array>
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <map>
 
+#include "tests/run_command.h"
 #include "tools/forgescan/station/station_services.h"
 
 namespace forgescan {
@@ -113,27 +112,17 @@ TEST_P(Verified, HasNothingSystemdWouldWarnOf) {
       << "[station]\nname = \"cell\"\nbus = \"udpm://239.255.76.67:7667?ttl=0\"\ncan = \"" << GetParam()
       << "\"\ncalibration = \"c\"\npattern = \"p\"\nviews = \"v\"\nmodel = \"m\"\nfeatures = \"f\"\n"
          "results = \"results\"\n[recorder]\nfolder = \"../disk/recordings\"\n";
-  const auto call = [](const std::string& command, std::string& text) {
-    FILE* pipe = popen((command + " 2>&1").c_str(), "r");
-    std::array<char, 4096> buffer{};
-    while (std::fgets(buffer.data(), buffer.size(), pipe) != nullptr) {
-      text += buffer.data();
-    }
-    return WEXITSTATUS(pclose(pipe));
-  };
-  std::string written, verified;
-  ASSERT_EQ(call(std::string(FORGESCAN_BIN_DIR) + "/forgescan station units " + (base / "cell").string() +
-                     " --out " + (base / "units").string(),
-                 written),
-            0)
-      << written;
-  EXPECT_THAT(written, HasSubstr("\n" + (base / "disk/recordings").string() + "\n"));
+  const CommandOutput written = RunCommand(std::string(FORGESCAN_BIN_DIR) + "/forgescan station units " +
+                                           (base / "cell").string() + " --out " + (base / "units").string());
+  ASSERT_EQ(written.exit_code, 0) << written.text;
+  EXPECT_THAT(written.text, HasSubstr("\n" + (base / "disk/recordings").string() + "\n"));
   std::ifstream recorder(base / "units/forgescan-cell-recorder.service");
   EXPECT_THAT(std::string(std::istreambuf_iterator<char>(recorder), {}),
               HasSubstr(" " + (base / "disk/recordings").string() + "\n"));
-  EXPECT_EQ(call("systemd-analyze verify --man=no " + (base / "units").string() + "/*", verified), 0)
-      << verified;
-  EXPECT_EQ(verified, "");
+  const CommandOutput verified =
+      RunCommand("systemd-analyze verify --man=no " + (base / "units").string() + "/*");
+  EXPECT_EQ(verified.exit_code, 0);
+  EXPECT_EQ(verified.text, "");
   fs::remove_all(base);
 }
 
