@@ -5,8 +5,10 @@
 #include <gmock/gmock.h>
 
 #include <csignal>
+#include <fstream>
 
 #include "services/common/bus/stream_header.h"
+
 namespace forgescan::testing {
 namespace {
 
