@@ -72,6 +72,13 @@ TEST_F(LogCli, CheckFindsAWrongBitInAPixel) {
   ExpectFinding("FRAME_LEFT: the closing event counts 3 events with 1995 bytes and CRC-32");
 }
 
+TEST_F(LogCli, CheckNamesAnEventWhoseTimeIsMinutesOff) {
+  TestRecording recording = TestRecording::Make();
+  recording.events[5].utime ^= std::int64_t{1} << 44;
+  Write(recording);
+  ExpectFinding("event 5: its time");
+}
+
 TEST_F(LogCli, CheckFindsWhatIsMissing) {
   TestRecording recording = TestRecording::Make();
   recording.events.erase(recording.events.begin() +

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "tools/forgescan/log/closing_check.h"
+#include "tools/forgescan/log/event_times.h"
 #include "tools/forgescan/log/message_check.h"
 #include "tools/forgescan/log/progress.h"
 
@@ -39,6 +40,10 @@ Result<std::vector<LogFinding>> CheckLog(const Recording& recording) {
   std::vector<LogFinding> findings;
   CheckDamage(log, findings);
   CheckNumbers(log, findings);
+  if (recording.opened.has_value()) {
+    ASSIGN_OR_RETURN(const EventTimes times, CheckEventTimes(log));
+    findings.insert(findings.end(), times.findings.begin(), times.findings.end());
+  }
   MessageCheck messages(recording);
   ClosingCheck closing(recording);
   Progress progress(log.file_bytes());

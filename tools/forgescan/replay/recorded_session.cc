@@ -1,7 +1,6 @@
 #include "tools/forgescan/replay/recorded_session.h"
 
 #include <algorithm>
-#include <cmath>
 #include <map>
 #include <set>
 #include <string_view>
@@ -11,6 +10,7 @@
 #include "services/common/bus/channels.h"
 #include "services/common/bus/codec.h"
 #include "tools/forgescan/log/closing_check.h"
+#include "tools/forgescan/log/event_times.h"
 
 namespace forgescan {
 namespace {
@@ -38,7 +38,8 @@ Result<std::vector<std::string>> FindingsOf(const Recording& recording) {
         fmt::format("{}: {} bytes at byte {}: {}", log.path(), damage.bytes, damage.offset, damage.what));
   }
   ClosingCheck check(recording);
-  std::vector<LogFinding> findings;
+  ASSIGN_OR_RETURN(EventTimes times, CheckEventTimes(log));
+  std::vector<LogFinding> findings = std::move(times.findings);
   for (const LogEntry& entry : log.entries()) {
     ASSIGN_OR_RETURN(const Bytes message, log.Read(entry));
     check.Add(entry, message, findings);
@@ -49,27 +50,6 @@ Result<std::vector<std::string>> FindingsOf(const Recording& recording) {
     sentences.push_back(fmt::format("{}{}: {} {}", log.path(), where, finding.channel, finding.what));
   }
   return sentences;
-}
-
-// Messages are recorded within seconds of their event (a verdict within the minutes of a scan), and a station
-// that runs is never silent for longer.
-constexpr std::int64_t kStepUs = 10 * 60'000'000LL;
-
-bool FarApart(std::int64_t a_us, std::int64_t b_us) {
-  const auto a = static_cast<double>(a_us), b = static_cast<double>(b_us);  // any bits: no overflow
-  return std::abs(a - b) > static_cast<double>(kStepUs);
-}
-
-// A wrong bit in an event's time: far from its neighbour's and from that of its own message, which begins
-// with it. Errors: kIo.
-Result<bool> HasWrongTime(const LogReader& log, std::size_t entry, std::int64_t neighbour_us) {
-  const LogEntry& event = log.entries()[entry];
-  if (!FarApart(event.utime, neighbour_us)) {
-    return false;
-  }
-  ASSIGN_OR_RETURN(const Bytes start, log.Read(event, kStreamHeaderBytes));
-  const auto utime = StreamUtime(start);
-  return !utime.ok() || FarApart(event.utime, *utime);
 }
 
 }  // namespace
@@ -189,21 +169,10 @@ Status RecordedSession::Merge() {
 
 Status RecordedSession::AddEvents(std::size_t log) {
   const LogReader& reader = logs_[log];
-  const auto& entries = reader.entries();
-  std::int64_t utime = 0;
-  for (std::size_t i = 0; i < entries.size(); ++i) {
-    const bool is_first = i == 0;
-    const std::int64_t next_us = entries[std::min(i + 1, entries.size() - 1)].utime;
-    const std::int64_t neighbour_us = is_first ? next_us : utime;
-    ASSIGN_OR_RETURN(const bool wrong, HasWrongTime(reader, i, neighbour_us));
-    if (wrong) {
-      findings_.push_back(
-          fmt::format("{}, event {} at byte {}: its time, {} us, is minutes off; taken is {} us",
-                      reader.path(), i, entries[i].offset, entries[i].utime, neighbour_us));
-    }
-    utime = std::max(utime, wrong ? neighbour_us : entries[i].utime);
-    if (!IsAddition(reader.ChannelOf(entries[i]))) {
-      events_.push_back({log, i, utime});
+  ASSIGN_OR_RETURN(const EventTimes times, CheckEventTimes(reader));
+  for (std::size_t i = 0; i < times.utimes.size(); ++i) {
+    if (!IsAddition(reader.ChannelOf(reader.entries()[i]))) {
+      events_.push_back({log, i, times.utimes[i]});
     }
   }
   return {};

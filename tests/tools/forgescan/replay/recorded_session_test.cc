@@ -100,7 +100,7 @@ TEST(RecordedSession, AWrongBitInATimeIsNamedAndTheNeighboursTimeTaken) {
     recording.CloseAfter([wrong](auto& events) { events[wrong].utime ^= std::int64_t{1} << 50; });
     const auto session = RecordedSession::Open({path});
     ASSERT_TRUE(session.ok()) << session.error().message;
-    EXPECT_THAT(session->findings(), ElementsAre(HasSubstr(fmt::format("event {} at byte", wrong))));
+    EXPECT_THAT(session->findings(), ElementsAre(HasSubstr(fmt::format("event {}: its time", wrong))));
     EXPECT_THAT(TimesAfter(*session), ElementsAre(10, wrong == 2 ? 10 : 20, 30));
   }
 }
