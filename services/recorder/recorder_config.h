@@ -12,7 +12,7 @@ struct RecorderConfig {
   double sorted_timeout_s = 30;       // for PART_SORTED after the verdict
   double part_timeout_s = 240;        // without news of a part that has no verdict
   int backlog_mb = 1500;              // received and not yet written; beyond it messages are dropped as gaps
-  int min_free_mb = 4000;             // on the disk, more than two parts; with less no part is recorded
+  int min_free_mb = 4000;             // on the disk, more than two parts; with less OK parts may go
   int station_volume_mb = 1000;       // of the station's own recording; a new one also begins every day (UTC)
   int keep_days = RetentionRules{}.keep_days;
   int keep_every_nth_ok = RetentionRules{}.keep_every_nth_ok;

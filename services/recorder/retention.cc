@@ -19,6 +19,7 @@ struct Candidate {
   const StoredRecording* file = nullptr;
   RecordingName name;
   std::int64_t utime = 0;    // of the recording, as far as it can be believed
+  bool unknown_age = false;  // its time cannot be believed; utime is now then
   bool kept_newest = false;  // one of the newest OK parts
   bool fresh = false;        // a .part that somebody may still be at
   bool gone = false;
@@ -42,7 +43,8 @@ std::vector<Candidate> Candidates(const std::vector<StoredRecording>& files, int
     }
     Candidate candidate{.file = &file, .name = *name};
     candidate.utime = std::max(name->utime, file.changed_us);
-    candidate.utime = candidate.utime < kFirstUtime ? now_us : candidate.utime;
+    candidate.unknown_age = candidate.utime < kFirstUtime || candidate.utime > now_us + kUsPerDay;
+    candidate.utime = candidate.unknown_age ? now_us : candidate.utime;
     candidate.fresh = !name->closed && file.changed_us != 0 && now_us - file.changed_us < kUsPerDay;
     candidates.push_back(candidate);
   }
@@ -51,7 +53,7 @@ std::vector<Candidate> Candidates(const std::vector<StoredRecording>& files, int
   });
   int newest = 0;
   for (auto candidate = candidates.rbegin(); candidate != candidates.rend(); ++candidate) {
-    candidate->kept_newest = candidate->ok() && newest++ < keep_newest_ok;
+    candidate->kept_newest = candidate->ok() && !candidate->unknown_age && newest++ < keep_newest_ok;
   }
   return candidates;
 }
@@ -87,7 +89,7 @@ void DropAged(std::vector<Candidate>& candidates, const RetentionRules& rules, s
   const std::int64_t keep_us = rules.keep_days * kUsPerDay;
   const AgeLimit limit = LimitOf(candidates, keep_us, now_us);
   for (Candidate& candidate : candidates) {
-    if (!candidate.free()) {
+    if (!candidate.free() || candidate.unknown_age) {
       continue;
     }
     if (candidate.utime < limit.from_us) {
@@ -105,42 +107,42 @@ void DropAged(std::vector<Candidate>& candidates, const RetentionRules& rules, s
   }
 }
 
-// The oldest of those that `may` go, OK parts first, until nothing is `missing`. Returns what still is.
-template <typename May>
-std::int64_t DropOldest(std::vector<Candidate>& candidates, std::int64_t missing_bytes, const May& may,
-                        const std::string& reason, RetentionPlan& plan) {
+// The oldest OK parts first, then the oldest others.
+void DropBeyondQuota(std::vector<Candidate>& candidates, const RetentionRules& rules, RetentionPlan& plan) {
+  std::int64_t excess_bytes = -rules.quota_bytes;
+  for (const Candidate& candidate : candidates) {
+    excess_bytes += candidate.gone ? 0 : candidate.file->bytes;
+  }
   for (const bool ok : {true, false}) {
     for (Candidate& candidate : candidates) {
-      if (missing_bytes > 0 && candidate.free() && candidate.ok() == ok && may(candidate)) {
-        missing_bytes -= candidate.file->bytes;
-        Delete(candidate, reason, plan);
+      if (excess_bytes > 0 && candidate.free() && candidate.ok() == ok) {
+        excess_bytes -= candidate.file->bytes;
+        Delete(candidate, fmt::format("beyond the quota of {} bytes", rules.quota_bytes), plan);
       }
     }
   }
-  return std::max<std::int64_t>(0, missing_bytes);
+  plan.bytes_over_quota = std::max<std::int64_t>(0, excess_bytes);
 }
 
-void DropBeyondQuota(std::vector<Candidate>& candidates, const RetentionRules& rules, RetentionPlan& plan) {
-  std::int64_t held_bytes = 0;
-  for (const Candidate& candidate : candidates) {
-    held_bytes += candidate.gone ? 0 : candidate.file->bytes;
-  }
-  plan.bytes_over_quota = DropOldest(
-      candidates, held_bytes - rules.quota_bytes, [](const Candidate&) { return true; },
-      fmt::format("beyond the quota of {} bytes", rules.quota_bytes), plan);
-}
-
+// The oldest OK parts of a disk, if that makes enough room: others are evidence, and a disk that something
+// else has filled is nothing recordings have to pay for.
 void DropForSpace(std::vector<Candidate>& candidates, const RetentionRules& rules, const FreeSpace& free,
                   RetentionPlan& plan) {
   for (const auto& [disk, free_bytes] : free) {
     std::int64_t missing_bytes = rules.min_free_bytes - free_bytes;
-    for (const Candidate& candidate : candidates) {
+    std::vector<Candidate*> enough;
+    for (Candidate& candidate : candidates) {
       missing_bytes -= candidate.gone && candidate.file->disk == disk ? candidate.file->bytes : 0;
     }
-    DropOldest(
-        candidates, missing_bytes,
-        [disk = disk](const Candidate& candidate) { return candidate.file->disk == disk; },
-        fmt::format("less than {} bytes are free", rules.min_free_bytes), plan);
+    for (Candidate& candidate : candidates) {
+      if (missing_bytes > 0 && candidate.free() && candidate.ok() && candidate.file->disk == disk) {
+        missing_bytes -= candidate.file->bytes;
+        enough.push_back(&candidate);
+      }
+    }
+    for (Candidate* candidate : missing_bytes > 0 ? std::vector<Candidate*>() : enough) {
+      Delete(*candidate, fmt::format("less than {} bytes are free", rules.min_free_bytes), plan);
+    }
   }
 }
 

@@ -2,13 +2,15 @@
 //
 // For keep_days stays every part that is NOT_OK, not decidable, not inspected, without verdict or incomplete,
 // every station's recording, and of the OK parts each whose number is a multiple of keep_every_nth_ok. The
-// newest keep_newest_ok OK parts stay whatever their age. Beyond the quota, and where a disk has less free
-// than a part needs, go the oldest OK parts first, then the oldest others; never an open file, never the
-// newest OK parts.
+// newest keep_newest_ok OK parts stay whatever their age. Beyond the quota go the oldest OK parts first, then
+// the oldest others. Where a disk has too little free, the oldest OK parts go, if that makes enough room; if
+// not, or if there are only others, nothing goes for it. Never an open file, never the newest OK parts.
 //
 // A recording's time is that in its name or of its last change, the later of the two. It is not believed
 // blindly, as a clock may have been wrong:
-//   - before 2026 no recording was made: such a file is of unknown age, and counts as new;
+//   - before 2026 no recording was made, and none in the future: such a file is of unknown age, goes only
+//   beyond
+//     the quota, and takes no place among the newest;
 //   - after a pause longer than keep_days nothing from before it is deleted by age until the recordings since
 //     then span keep_days themselves: a clock that was set too far ahead looks like such a pause.
 #pragma once

@@ -177,8 +177,22 @@ TEST_F(RetentionTest, ALeftOverThatChangedToday) {
   EXPECT_EQ(Deleted().size(), 1u);
 }
 
-TEST_F(RetentionTest, ADiskWithTooLittleSpaceIsGivenSomeInTheOrderOfTheQuota) {
-  const auto bad = Add(1, Verdict::VERDICT_NOT_OK);
+TEST_F(RetentionTest, RecordingsOfTheFutureTakeNoPlaceAmongTheNewest) {
+  for (int part = 41; part <= 43; ++part) {
+    Add(part, Verdict::VERDICT_OK, true, -3650);
+  }
+  const auto old = Add(5, Verdict::VERDICT_OK);
+  Add(6, Verdict::VERDICT_OK);
+  Add(7, Verdict::VERDICT_OK);
+  EXPECT_THAT(Deleted(), ElementsAre(old)) << "two are kept";
+  rules_.quota_bytes = 5 * kBytes;
+  EXPECT_EQ(Deleted().size(), 1u);
+  rules_.quota_bytes = 4 * kBytes;
+  EXPECT_EQ(Deleted().size(), 2u) << "beyond the quota they go";
+}
+
+TEST_F(RetentionTest, ADiskWithTooLittleSpaceIsGivenThatOfTheOldestOkParts) {
+  Add(1, Verdict::VERDICT_NOT_OK);
   const auto nth = Add(4, Verdict::VERDICT_OK);
   Add(5, Verdict::VERDICT_OK);
   Add(6, Verdict::VERDICT_OK);
@@ -189,7 +203,7 @@ TEST_F(RetentionTest, ADiskWithTooLittleSpaceIsGivenSomeInTheOrderOfTheQuota) {
   rules_.min_free_bytes = 5 * kBytes;
   EXPECT_THAT(Deleted({{0, 5 * kBytes}, {1, 5 * kBytes}}), IsEmpty());
   EXPECT_THAT(Deleted({{0, 5 * kBytes}, {1, 4 * kBytes}}), ElementsAre(nth));
-  EXPECT_THAT(Deleted({{0, 5 * kBytes}, {1, 0}}), ElementsAre(nth, bad)) << "the newest OK parts stay";
+  EXPECT_THAT(Deleted({{0, 5 * kBytes}, {1, 3 * kBytes}}), IsEmpty()) << "one part is not enough: in vain";
 }
 
 }  // namespace
