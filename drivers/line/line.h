@@ -10,7 +10,7 @@ namespace forgescan {
 enum class LineVerdict : std::uint8_t { kUnknown, kOk, kNotOk, kNotDecidable, kNotInspected };
 enum class GateState : std::uint8_t { kUnknown, kMoving, kDone, kStuck };
 
-// Repeated with the same seq until the echo carries it.
+// Repeated with the same seq until the echo carries it and the gate is done or stuck.
 struct LineCommand {
   std::uint32_t part = 0;
   LineVerdict verdict = LineVerdict::kUnknown;

@@ -21,9 +21,14 @@ SortMachine::Actions SortMachine::Begin(std::int64_t now_us) {
   command_ = {waiting_.front().first, waiting_.front().second, static_cast<std::uint16_t>(command_.seq + 1)};
   waiting_.pop_front();
   phase_ = Phase::kAsking;
-  sent_ = 1;
-  deadline_us_ = now_us + config_.sort_echo_timeout_ms * kUsPerMs;
-  return {command_};
+  sent_ = 0;
+  return {Command(now_us)};
+}
+
+LineCommand SortMachine::Command(std::int64_t now_us) {
+  ++sent_;
+  repeat_us_ = now_us + config_.sort_echo_timeout_ms * kUsPerMs;
+  return command_;
 }
 
 SortMachine::Actions SortMachine::Finish(std::int64_t now_us, const std::string& reason) {
@@ -43,7 +48,7 @@ SortMachine::Actions SortMachine::OnEcho(const LineSortEcho& echo) {
   }
   if (phase_ == Phase::kAsking) {
     phase_ = Phase::kMoving;
-    deadline_us_ = echo.utime + static_cast<std::int64_t>(config_.gate_timeout_s * 1e6);
+    gate_until_us_ = echo.utime + static_cast<std::int64_t>(config_.gate_timeout_s * 1e6);
   }
   if (echo.gate == GateState::kDone) {
     return Finish(echo.utime, "");
@@ -52,18 +57,16 @@ SortMachine::Actions SortMachine::OnEcho(const LineSortEcho& echo) {
 }
 
 SortMachine::Actions SortMachine::OnTick(std::int64_t now_us) {
-  if (phase_ == Phase::kIdle || now_us < deadline_us_) {
-    return {};
-  }
-  if (phase_ == Phase::kMoving) {
+  if (phase_ == Phase::kMoving && now_us >= gate_until_us_) {
     return Finish(now_us, fmt::format("the gate was not done after {} s", config_.gate_timeout_s));
   }
-  if (sent_ > config_.sort_resends) {
+  if (phase_ == Phase::kIdle || now_us < repeat_us_) {
+    return {};
+  }
+  if (phase_ == Phase::kAsking && sent_ > config_.sort_resends) {
     return Finish(now_us, fmt::format("the line did not echo the sort command, sent {} times", sent_));
   }
-  ++sent_;
-  deadline_us_ = now_us + config_.sort_echo_timeout_ms * kUsPerMs;
-  return {command_};
+  return {Command(now_us)};
 }
 
 }  // namespace forgescan

@@ -2,7 +2,9 @@
 // out.
 //
 //   idle --verdict--> asking --echo of seq, part and verdict--> moving --gate done--> acknowledged, idle
-//   asking: no or a wrong echo after the resends -> failed; moving: gate stuck or not done in time -> failed
+//   asking: no or a wrong echo after the resends -> failed; moving: gate stuck or not done in time -> failed.
+//   moving, the command is repeated too: the answer says how the gate stands, should that echo have been
+//   lost.
 #pragma once
 
 #include <deque>
@@ -39,13 +41,15 @@ class SortMachine {
   enum class Phase { kIdle, kAsking, kMoving };
 
   Actions Begin(std::int64_t now_us);
+  LineCommand Command(std::int64_t now_us);
   Actions Finish(std::int64_t now_us, const std::string& reason);
 
   RobotConfig config_;
   Phase phase_ = Phase::kIdle;
   LineCommand command_;
   int sent_ = 0;
-  std::int64_t deadline_us_ = 0;
+  std::int64_t repeat_us_ = 0;  // the next time the command is repeated, or given up while asking
+  std::int64_t gate_until_us_ = 0;
   std::deque<std::pair<std::uint32_t, LineVerdict>> waiting_;
 };
 

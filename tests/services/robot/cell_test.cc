@@ -265,6 +265,20 @@ TEST_F(Cell, AVerdictOnAnEarlierPartOfTheSameNumberSortsNothing) {
   EXPECT_EQ(line_sim_.sorted().at(0).verdict, LineVerdict::kNotOk);
 }
 
+TEST_F(Cell, ALostWordThatTheGateIsDoneIsAskedForAgain) {
+  ASSERT_TRUE(RunUntilScans(1));
+  Verdict(1, fsmsg::verdict_t::VERDICT_OK);
+  network_.RunFor(kSecond_us / 10);  // the gate moves for 0.3 s
+  line_sim_.SetFaults({.lost_echo = true});
+  network_.RunFor(kSecond_us / 2);
+  EXPECT_TRUE(sorted_.empty());
+  line_sim_.SetFaults({});
+  network_.RunFor(kSecond_us);
+  ASSERT_EQ(sorted_.size(), 1U);
+  EXPECT_EQ(sorted_[0].acknowledged, 1) << sorted_[0].reason;
+  EXPECT_EQ(line_sim_.sorted().size(), 1U);
+}
+
 TEST_F(Cell, AnUnheardSortCommandIsReported) {
   ASSERT_TRUE(RunUntilScans(1));
   line_sim_.SetFaults({.wrong_echo = true});

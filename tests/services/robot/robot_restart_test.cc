@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <filesystem>
+#include <fstream>
 
 #include "drivers/can/can_inprocess.h"
 #include "drivers/line/line_canopen.h"

@@ -72,13 +72,17 @@ class Progress {
   }
 
   const std::vector<fsmsg::verdict_t>& verdicts() const { return verdicts_; }
+  // Parts about which the robot service has said its last word: the line has sorted them, or has not.
   int sorted() const { return static_cast<int>(sorted_.size()); }
+  int not_sorted() const { return not_sorted_; }
   double Seconds() const { return static_cast<double>(hub_.bus().NowUs() - start_us_) * 1e-6; }
 
  private:
   void NoteSorted(const fsmsg::part_sorted_t& m) {
-    if (m.acknowledged == 1) {
-      sorted_.insert(m.part);
+    sorted_.insert(m.part);
+    if (m.acknowledged == 0) {
+      ++not_sorted_;
+      Say(m.part, "NOT SORTED: {}", m.reason);
     }
   }
   // A verdict is said again where a service that was started anew may have missed it.
@@ -106,6 +110,7 @@ class Progress {
   StreamHub& hub_;
   std::vector<fsmsg::verdict_t> verdicts_;
   std::set<int> sorted_;  // parts
+  int not_sorted_ = 0;
 };
 
 Result<fs::path> MakeRunFolder(const std::string& base) {
@@ -197,7 +202,10 @@ Status Inspect(const InspectOptions& options) {
   cell.Stop();
   RETURN_IF_ERROR(inspected);
   RETURN_IF_ERROR(stopped);
-  return ShowOutcome(run, runner->station().results, progress.verdicts(), options.parts);
+  RETURN_IF_ERROR(ShowOutcome(run, runner->station().results, progress.verdicts(), options.parts));
+  return progress.not_sorted() == 0
+             ? Status()
+             : Fail(ErrorCode::kUntrusted, "the line did not sort {} of the parts", progress.not_sorted());
 }
 
 }  // namespace
