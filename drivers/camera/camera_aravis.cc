@@ -48,7 +48,7 @@ Status CameraAravisOptions::Check() const {
   RETURN_IF_ERROR(InRange("buffers", buffers, 2, 1000));
   RETURN_IF_ERROR(
       InRange("queue_capacity_frames", static_cast<std::int64_t>(queue_capacity_frames), 1, 100'000));
-  RETURN_IF_ERROR(InRange("heartbeat_timeout_ms", heartbeat_timeout_ms, 1500, 60'000));
+  RETURN_IF_ERROR(InRange("heartbeat_timeout_ms", heartbeat_timeout_ms, 1600, 60'000));
   return InRange("teardown_wait_ms", teardown_wait_ms, 0, 60'000);
 }
 

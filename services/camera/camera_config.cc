@@ -18,7 +18,7 @@ Result<CameraConfig> CameraConfig::Load(ConfigTable table, const std::string& si
   table.Optional("frame_deadline_s", config.frame_deadline_s, 0.05, 60.0);
   table.Optional("view_timeout_s", config.view_timeout_s, 0.1, 600.0);
   table.Optional("reconnect_s", config.reconnect_s, 0.1, 60.0);
-  table.Optional("heartbeat_timeout_ms", config.heartbeat_timeout_ms, 1500, 60'000);
+  table.Optional("heartbeat_timeout_ms", config.heartbeat_timeout_ms, 1600, 60'000);
   table.Optional("pairing_tolerance_us", config.pairing.tolerance_us, std::int64_t{1}, std::int64_t{10'000});
   table.Optional("pairing_drift_ppm", config.pairing.drift_ppm, 0.0, 1000.0);
   RETURN_IF_ERROR(table.Finish());

@@ -55,7 +55,7 @@ class Run {
     for (const auto& network : networks_) {
       network->Finish();
     }
-    outcome_.comparison.Finish();
+    RETURN_IF_ERROR(outcome_.comparison.Finish());
     for (const std::string& changed : outcome_.comparison.changed_records()) {
       auto& all = outcome_.changed_inputs;
       if (std::find(all.begin(), all.end(), changed) == all.end()) {  // one service's result, another's input

@@ -72,12 +72,18 @@ Status ResultComparison::Compare(const RecordedEvent& event, const std::string& 
   return {};
 }
 
-void ResultComparison::Finish() {
+Status ResultComparison::Finish() {
   for (const auto& [moment, events] : recorded_) {
     const auto came = replayed_.find(moment);
-    const std::size_t count = came == replayed_.end() ? 0 : std::min(came->second, events.size());
-    channels_[moment.first].missing += static_cast<std::int64_t>(events.size() - count);
+    for (std::size_t i = came == replayed_.end() ? 0 : came->second; i < events.size(); ++i) {
+      ++channels_[moment.first].missing;
+      ASSIGN_OR_RETURN(const Bytes recorded, session_->Read(events[i]));
+      if (const auto header = CheckStreamHeader(recorded); !header.ok()) {
+        changed_records_.push_back(NotAsSent(*session_, events[i], recorded, header.error()));
+      }
+    }
   }
+  return {};
 }
 
 std::size_t ResultComparison::RecordedCount(const std::string& channel, std::int64_t utime) const {

@@ -45,8 +45,8 @@ class ResultComparison {
   // their order. A recorded message that is not as it was sent is a difference. Errors: kIo (the record
   // cannot be read), kFormat (`replayed` is no stream's message).
   Status Add(const std::string& channel, ByteView replayed);
-  // After the last message: what has not come is missing.
-  void Finish();
+  // After the last message: what has not come is missing. Errors: kIo.
+  Status Finish();
 
   // How many messages on the channel are recorded of the event that was then.
   std::size_t RecordedCount(const std::string& channel, std::int64_t utime) const;

@@ -52,7 +52,7 @@ TEST_F(ResultComparisonTest, EqualMessagesAreEqualWhateverTheirNumbering) {
   for (const auto& message : {Verdict(3, 20), Verdict(1, 10), Verdict(2, 10)}) {
     Replay(message);
   }
-  comparison_->Finish();
+  ASSERT_TRUE(comparison_->Finish().ok());
   EXPECT_EQ(Counts().equal, 3);
   EXPECT_TRUE(comparison_->Same());
   EXPECT_FALSE(comparison_->first_difference().has_value());
@@ -64,7 +64,7 @@ TEST_F(ResultComparisonTest, OneFieldThatDiffersIsADifference) {
   Replay(Verdict(1, 10));
   Replay(wrong);
   Replay(Verdict(3, 20));
-  comparison_->Finish();
+  ASSERT_TRUE(comparison_->Finish().ok());
   EXPECT_EQ(Counts().equal, 2);
   EXPECT_EQ(Counts().differing, 1);
   EXPECT_FALSE(comparison_->Same());
@@ -78,7 +78,7 @@ TEST_F(ResultComparisonTest, OneFieldThatDiffersIsADifference) {
 TEST_F(ResultComparisonTest, CountsWhatIsMissingAndWhatIsMore) {
   Replay(Verdict(1, 10));
   Replay(Verdict(9, 30));
-  comparison_->Finish();
+  ASSERT_TRUE(comparison_->Finish().ok());
   EXPECT_EQ(Counts().equal, 1);
   EXPECT_EQ(Counts().missing, 2);
   EXPECT_EQ(Counts().extra, 1);
@@ -98,16 +98,34 @@ TEST(ResultComparison, ARecordedResultThatWasChangedIsADifferenceAndNamed) {
   ASSERT_TRUE(comparison.ok());
   const Status added = comparison->Add("VERDICT", bytes);
   ASSERT_TRUE(added.ok()) << added.error().message;
-  comparison->Finish();
+  ASSERT_TRUE(comparison->Finish().ok());
   EXPECT_EQ(comparison->Total().differing, 1);
   ASSERT_EQ(comparison->changed_records().size(), 1u);
   EXPECT_NE(comparison->changed_records()[0].find("VERDICT"), std::string::npos);
 }
 
+TEST(ResultComparison, ARecordedResultWithAWrongBitInItsTimeIsMissingAndNamed) {
+  const TestFolder folder;
+  fsmsg::verdict_t verdict{};
+  verdict.utime = kSession + 10;
+  WrittenRecording recording(folder / "one.lcmlog");
+  const Bytes bytes = recording.Stream(kVerdict, verdict, 1);
+  recording.CloseAfter([](auto& events) { events[1].message[15] ^= 1; });  // fingerprint, utime
+  const auto session = RecordedSession::Open({folder / "one.lcmlog"});
+  ASSERT_TRUE(session.ok()) << session.error().message;
+  auto comparison = ResultComparison::Create(*session, {"VERDICT"});
+  ASSERT_TRUE(comparison.ok());
+  ASSERT_TRUE(comparison->Add("VERDICT", bytes).ok());
+  ASSERT_TRUE(comparison->Finish().ok());
+  EXPECT_EQ(comparison->Total().missing, 1);
+  EXPECT_EQ(comparison->Total().extra, 1);
+  EXPECT_EQ(comparison->changed_records().size(), 1u);
+}
+
 TEST_F(ResultComparisonTest, NothingComparedIsNotTheSame) {
   auto nothing = ResultComparison::Create(*session_, {"REGISTRATION"});
   ASSERT_TRUE(nothing.ok());
-  nothing->Finish();
+  ASSERT_TRUE(nothing->Finish().ok());
   EXPECT_FALSE(nothing->Same());
 }
 

@@ -1,7 +1,15 @@
 // The production camera driver opens the virtual camera, or says why it cannot.
+#include <arpa/inet.h>
 #include <gtest/gtest.h>
+#include <poll.h>
+#include <sys/socket.h>
 
 #include "tests/tools/virtual_station/gige/gige_channel.h"
+#include "tests/tools/virtual_station/gige/gvcp_command.h"
+#include "tools/virtual_station/gige/bytes.h"
+#include "tools/virtual_station/gige/gvcp.h"
+#include "tools/virtual_station/gige/registers.h"
+#include "tools/virtual_station/gige/socket.h"
 
 namespace forgescan {
 namespace {
@@ -17,6 +25,32 @@ TEST(GigeOpening, CameraHeldByAnotherIsUnavailableUntilReleased) {
   channel->camera = nullptr;
   const Status started = second.Start();
   EXPECT_TRUE(started.ok()) << started.error().message;
+}
+
+TEST(GigeOpening, TheCameraIsToldHowLongAServiceThatDiedHoldsIt) {
+  const GigeDeviceConfig config = SmallDevice("127.0.0.1");
+  const auto device = GigeDevice::Create(config);
+  ASSERT_TRUE(device.ok()) << device.error().message;
+  CameraAravisOptions options = OptionsFor(config);
+  options.heartbeat_timeout_ms = 2345;
+  CameraAravis camera(options);
+  ASSERT_TRUE(camera.Start().ok());
+  const auto socket = gige::UdpSocket::Bind(0x7f000001, 0, false);
+  ASSERT_TRUE(socket.ok());
+  const gige::Bytes question =
+      gige::Command(gige::GvcpOperation::kReadRegister, {gige::reg::kHeartbeatTimeout});
+  sockaddr_in to{};
+  to.sin_family = AF_INET;
+  to.sin_addr.s_addr = htonl(0x7f000001);
+  to.sin_port = htons(gige::kGvcpPort);
+  ASSERT_GT(::sendto(socket->fd(), question.data(), question.size(), 0,
+                     reinterpret_cast<const sockaddr*>(&to), sizeof to),
+            0);
+  pollfd readable{socket->fd(), POLLIN, 0};
+  ASSERT_EQ(::poll(&readable, 1, 5000), 1);
+  gige::Bytes reply(64);
+  ASSERT_EQ(::recv(socket->fd(), reply.data(), reply.size(), 0), 12);
+  EXPECT_EQ(gige::Get32(reply, 8), 2345U);
 }
 
 TEST(GigeOpening, AddressWithoutCameraIsUnavailable) {
