@@ -35,6 +35,11 @@ class LineSim final : public LineSignals {
   Status Send(const LineCommand& command) override;
   void Step(std::int64_t now_us) override;
 
+  // Parts leave and come later by this; the gate is another mechanism.
+  void HoldParts(std::int64_t longer_us) {
+    in_place_us_ += longer_us;
+    next_part_us_ += longer_us;
+  }
   void SetTemperature(Temperature temperature) { temperature_ = std::move(temperature); }
   void SetFaults(const LineSimFaults& faults) { faults_ = faults; }
   // What the gate did, in order: one entry for each part.

@@ -114,7 +114,7 @@ TEST_F(RecorderDiskTest, AFileThatCannotBeClosedIsLoudAndInTheStationsFile) {
     fs::remove(entry.path());
   }
   const auto recordings = Stop();
-  const auto& gaps = OfStation(recordings).at(0).closed->gaps;
+  const auto gaps = OfStation(recordings).at(0).closed->gaps;
   ASSERT_EQ(gaps.size(), 2u);
   EXPECT_THAT(gaps[0].reason, HasSubstr("part 7 could not be closed"));
   EXPECT_THAT(gaps[1].reason, HasSubstr("part 8 could not be closed")) << "while the recorder stopped";

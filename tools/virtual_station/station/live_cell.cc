@@ -153,7 +153,7 @@ void LiveCell::FollowRobot(std::int64_t elapsed_us) {
   robot_.SetFaults({.stuck = rendered == nullptr});
   if (rendered == nullptr && robot_.progress() >= 1.0) {
     held_us_ += elapsed_us;
-    line_held_us_ += elapsed_us;
+    line_.HoldParts(elapsed_us);
   }
 }
 
@@ -215,7 +215,7 @@ Status LiveCell::Step() {
   cooling_node_.Step(now_us_);
   line_node_.StepWire(now_us_);
   if (line_started_) {
-    line_.Step(now_us_ - line_held_us_);  // no part leaves, and none comes, while the picture is awaited
+    line_.Step(now_us_);
     FollowLine();
   }
   FollowRobot(now_us_ - before_us);

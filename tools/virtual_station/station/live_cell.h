@@ -69,7 +69,6 @@ class LiveCell {
   int part_ = 0;  // in place, 0 = none yet
   std::int64_t in_place_us_ = 0;
   std::int64_t held_us_ = 0;                       // the thermal clock stood still: the renderer was behind
-  std::int64_t line_held_us_ = 0;                  // the same for the line, over all parts
   std::optional<std::uint16_t> followed_order_;    // of the robot: the last whose view was requested
   std::map<int, int> visits_;                      // by view of part_: how often the robot went there
   std::map<int, std::map<int, ViewState>> taken_;  // by part and view: as rendered
