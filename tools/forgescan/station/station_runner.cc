@@ -52,7 +52,8 @@ ServiceWord WordOf(const State& state) {
   return {.service = state.name,
           .session = state.session,
           .starting = state.state == State::STATE_STARTING,
-          .ready = state.state == State::STATE_READY || state.state == State::STATE_WORKING};
+          .ready = state.state == State::STATE_READY || state.state == State::STATE_WORKING,
+          .age_us = state.utime - state.session};
 }
 
 }  // namespace
