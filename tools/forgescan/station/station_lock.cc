@@ -128,7 +128,7 @@ Result<StationLock> StationLock::Take(const std::string& folder, double stop_pat
 }
 
 StationLock::~StationLock() {
-  if (file_.get() >= 0) {
+  if (file_.get() >= 0 && left_behind_.empty()) {
     std::error_code ignored;  // a file left behind is not locked
     std::filesystem::remove(path_, ignored);
   }

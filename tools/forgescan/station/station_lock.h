@@ -60,7 +60,7 @@ class RunningStation {
   ServiceProcesses services_;
 };
 
-// Held by whoever runs the station.
+// Held by whoever runs the station. Removes the file at its end, unless it names what may still run.
 class StationLock {
  public:
   // Errors: kUnavailable (somebody else holds it), kIo (not to be written).
@@ -71,6 +71,8 @@ class StationLock {
 
   // Services of an earlier supervisor that did not stop in order. They may still run.
   const ServiceProcesses& left_behind() const { return left_behind_; }
+  // None of them runs any more. Until then the file stays for the next one to take.
+  void LeftBehindHaveEnded() { left_behind_.clear(); }
   // Errors: kIo.
   Status Write(const ServiceProcesses& services) const;
   // The last word, for RunningStation::Outcome(). Errors: kIo.

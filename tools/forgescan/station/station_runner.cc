@@ -83,6 +83,7 @@ Result<std::unique_ptr<StationRunner>> StationRunner::Create(const std::string& 
   ASSIGN_OR_RETURN(StationLock lock, StationLock::Take(folder, LongestStopS(station, policy)));
   ASSIGN_OR_RETURN(SupervisorLog log, SupervisorLog::Open(LogFolder(folder), echo));
   RETURN_IF_ERROR(EndLeftovers(lock.left_behind(), policy, log));
+  lock.LeftBehindHaveEnded();
   std::signal(SIGPIPE, SIG_IGN);  // nobody reads the output any more: no reason to leave the services alone
   ASSIGN_OR_RETURN(auto bus, LcmBus::Open(station.bus_url));
   return std::unique_ptr<StationRunner>(

@@ -13,6 +13,8 @@
 #include <optional>
 #include <thread>
 
+#include "tools/forgescan/station/station_runner.h"
+
 namespace forgescan {
 namespace {
 
@@ -71,6 +73,30 @@ TEST_F(StationLockTest, AFileLeftBehindNamesNobodyButWhatMayStillRun) {
   ASSERT_TRUE(lock.ok());
   EXPECT_EQ(lock->left_behind().at("robot").process, (ProcessId{1234, 99}));
   EXPECT_TRUE(RunningStation::Find(folder_.string())->services().contains("robot"));
+}
+
+// Whatever keeps a start from coming so far: the next one has to know them, too.
+TEST_F(StationLockTest, AStartThatFailsForgetsNobodyThatMayStillRun) {
+  std::ofstream(folder_ / "station.toml")
+      << "[station]\nname = \"cell\"\nbus = \"no bus\"\ncan = \"socketcan:can0\"\ncalibration = \"c\"\n"
+      << "pattern = \"p\"\nviews = \"v\"\nmodel = \"m\"\nfeatures = \"f\"\nresults = \"r\"\n";
+  std::ofstream(File()) << "4321 98 120\nrobot 1234 0 99 0\n";
+  std::ofstream(folder_ / "log") << "no folder";
+  for (int start = 0; start < 2; ++start) {
+    const auto failed = StationRunner::Create(folder_.string(), Echo::kNothing);
+    ASSERT_FALSE(failed.ok());
+    EXPECT_THAT(failed.error().message, HasSubstr("supervisor.log: cannot be written"));
+    EXPECT_FALSE(IsUp());
+    const auto lock = Take();
+    ASSERT_TRUE(lock.ok());
+    ASSERT_TRUE(lock->left_behind().contains("robot")) << "start " << start;
+    EXPECT_EQ(lock->left_behind().at("robot").process, (ProcessId{1234, 99}));
+  }
+  fs::remove(folder_ / "log");
+  const auto failed = StationRunner::Create(folder_.string(), Echo::kNothing);
+  ASSERT_FALSE(failed.ok());
+  EXPECT_THAT(failed.error().message, HasSubstr("no bus"));
+  EXPECT_FALSE(fs::exists(File())) << "there is no such process any more";
 }
 
 // What stands in the file between the lock and the first word is of the supervisor before; its number may be
