@@ -114,8 +114,10 @@ Result<StationLock> StationLock::Take(const std::string& folder, double stop_pat
     }
     struct flock wanted = WholeFile();
     if (fcntl(file.get(), F_OFD_SETLK, &wanted) != 0) {
-      return Fail(ErrorCode::kUnavailable, "station {} is up already; forgescan station down {} stops it",
-                  folder, folder);
+      const bool held = errno == EAGAIN || errno == EACCES;
+      return held ? Fail(ErrorCode::kUnavailable,
+                         "station {} is up already; forgescan station down {} stops it", folder, folder)
+                  : Fail(ErrorCode::kIo, "{} cannot be locked: {}", path, std::strerror(errno));
     }
     if (!IsTheFileAt(path, file.get())) {
       continue;  // the station went down, and its file with it, between open and lock

@@ -63,7 +63,7 @@ class RunningStation {
 // Held by whoever runs the station. Removes the file at its end, unless it names what may still run.
 class StationLock {
  public:
-  // Errors: kUnavailable (somebody else holds it), kIo (not to be written).
+  // Errors: kUnavailable (somebody else holds it), kIo (no such file can be made, or none be locked here).
   static Result<StationLock> Take(const std::string& folder, double stop_patience_s);
   StationLock(StationLock&&) = default;
   StationLock& operator=(StationLock&&) = delete;

@@ -1,13 +1,21 @@
 // FOLDER/station.pid: who holds it, what others read in it, and what a crash leaves.
 #include "tools/forgescan/station/station_lock.h"
 
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <linux/filter.h>
+#include <linux/seccomp.h>
 #include <poll.h>
+#include <sys/prctl.h>
+#include <sys/syscall.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <array>
 #include <atomic>
+#include <cerrno>
+#include <cstddef>
 #include <filesystem>
 #include <fstream>
 #include <optional>
@@ -21,6 +29,24 @@ namespace {
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 constexpr double kPatienceS = 120;
+
+// From now on this process asks in vain for locks, as on a file system that has none.
+bool RefuseLocks() {
+  const auto load = [](std::size_t at) {
+    return sock_filter{BPF_LD | BPF_W | BPF_ABS, 0, 0, static_cast<std::uint32_t>(at)};
+  };
+  std::array<sock_filter, 6> rules{
+      load(offsetof(seccomp_data, nr)),
+      sock_filter{BPF_JMP | BPF_JEQ | BPF_K, 0, 3, SYS_fcntl},
+      load(offsetof(seccomp_data, args[1])),  // its lower half
+      sock_filter{BPF_JMP | BPF_JEQ | BPF_K, 0, 1, F_OFD_SETLK},
+      sock_filter{BPF_RET | BPF_K, 0, 0, SECCOMP_RET_ERRNO | ENOLCK},
+      sock_filter{BPF_RET | BPF_K, 0, 0, SECCOMP_RET_ALLOW},
+  };
+  const sock_fprog program{rules.size(), rules.data()};
+  return prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) == 0 &&
+         prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, &program) == 0;
+}
 
 class StationLockTest : public ::testing::Test {
  protected:
@@ -45,6 +71,24 @@ TEST_F(StationLockTest, OnlyOneHoldsAStation) {
   }
   EXPECT_FALSE(IsUp());
   EXPECT_TRUE(Take().ok());
+}
+
+TEST_F(StationLockTest, AFileThatCannotBeLockedIsNoStationThatIsUp) {
+  int words[2];
+  ASSERT_EQ(pipe(words), 0);
+  const pid_t pid = fork();
+  if (pid == 0) {
+    const bool refused = RefuseLocks();
+    const auto lock = Take();
+    const std::string word = !refused ? "no filter" : lock.ok() ? "locked" : lock.error().message;
+    _exit(write(words[1], word.data(), word.size()) > 0 ? 0 : 1);
+  }
+  close(words[1]);
+  std::array<char, 1000> word{};
+  EXPECT_GT(read(words[0], word.data(), word.size() - 1), 0);
+  close(words[0]);
+  EXPECT_EQ(waitpid(pid, nullptr, 0), pid);
+  EXPECT_EQ(std::string(word.data()), File().string() + " cannot be locked: No locks available");
 }
 
 TEST_F(StationLockTest, OthersReadWhatIsWritten) {
