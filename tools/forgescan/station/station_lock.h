@@ -69,6 +69,9 @@ class StationLock {
   StationLock& operator=(StationLock&&) = delete;
   ~StationLock();
 
+  // Of naming this process in the file when it was taken. The lock holds without it, but others do not find
+  // the station until a Write() succeeds.
+  const Status& named() const { return named_; }
   // Services of an earlier supervisor that did not stop in order. They may still run.
   const ServiceProcesses& left_behind() const { return left_behind_; }
   // None of them runs any more. Until then the file stays for the next one to take.
@@ -87,6 +90,7 @@ class StationLock {
   OwnedFd file_;
   double stop_patience_s_;
   ServiceProcesses left_behind_;
+  Status named_;
 };
 
 }  // namespace forgescan

@@ -8,6 +8,7 @@
 #include <linux/seccomp.h>
 #include <poll.h>
 #include <sys/prctl.h>
+#include <sys/resource.h>
 #include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -15,6 +16,7 @@
 #include <array>
 #include <atomic>
 #include <cerrno>
+#include <csignal>
 #include <cstddef>
 #include <filesystem>
 #include <fstream>
@@ -48,12 +50,38 @@ bool RefuseLocks() {
          prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, &program) == 0;
 }
 
+// While it lives no file takes a byte, as on a full disk.
+class NoRoom {
+ public:
+  NoRoom() : old_action_(std::signal(SIGXFSZ, SIG_IGN)) {
+    getrlimit(RLIMIT_FSIZE, &old_limit_);
+    const rlimit nothing{0, old_limit_.rlim_max};
+    setrlimit(RLIMIT_FSIZE, &nothing);
+  }
+  NoRoom(const NoRoom&) = delete;
+  NoRoom& operator=(const NoRoom&) = delete;
+  ~NoRoom() {
+    setrlimit(RLIMIT_FSIZE, &old_limit_);
+    std::signal(SIGXFSZ, old_action_);
+  }
+
+ private:
+  void (*old_action_)(int);
+  rlimit old_limit_{};
+};
+
 class StationLockTest : public ::testing::Test {
  protected:
   StationLockTest() { fs::create_directories(folder_); }
   ~StationLockTest() override { fs::remove_all(folder_); }
   bool IsUp() const { return RunningStation::Find(folder_.string()).ok(); }
   Result<StationLock> Take() const { return StationLock::Take(folder_.string(), kPatienceS); }
+  // One that ends at its bus.
+  void WriteStation() const {
+    std::ofstream(folder_ / "station.toml")
+        << "[station]\nname = \"cell\"\nbus = \"no bus\"\ncan = \"socketcan:can0\"\ncalibration = \"c\"\n"
+        << "pattern = \"p\"\nviews = \"v\"\nmodel = \"m\"\nfeatures = \"f\"\nresults = \"r\"\n";
+  }
   fs::path File() const { return folder_ / "station.pid"; }
 
   fs::path folder_ = fs::temp_directory_path() / ("forgescan-lock-" + std::to_string(getpid()));
@@ -119,11 +147,33 @@ TEST_F(StationLockTest, AFileLeftBehindNamesNobodyButWhatMayStillRun) {
   EXPECT_TRUE(RunningStation::Find(folder_.string())->services().contains("robot"));
 }
 
+TEST_F(StationLockTest, AFullDiskKeepsNobodyFromHoldingAStation) {
+  std::optional<NoRoom> no_room(std::in_place);
+  const auto lock = Take();
+  const auto again = Take();
+  const bool found = IsUp();
+  no_room.reset();
+  ASSERT_TRUE(lock.ok()) << lock.error().message;
+  ASSERT_FALSE(lock->named().ok());
+  EXPECT_THAT(lock->named().error().message, HasSubstr("station.pid: cannot be written: "));
+  EXPECT_FALSE(again.ok()) << "it holds";
+  EXPECT_FALSE(found) << "it names nobody";
+  EXPECT_TRUE(lock->Write({}).ok());
+  EXPECT_TRUE(IsUp());
+}
+
+TEST_F(StationLockTest, AFullDiskKeepsNoStationFromStarting) {
+  WriteStation();
+  std::optional<NoRoom> no_room(std::in_place);
+  const auto failed = StationRunner::Create(folder_.string(), Echo::kNothing);
+  no_room.reset();
+  ASSERT_FALSE(failed.ok());
+  EXPECT_THAT(failed.error().message, HasSubstr("no bus")) << "it came as far as that";
+}
+
 // Whatever keeps a start from coming so far: the next one has to know them, too.
 TEST_F(StationLockTest, AStartThatFailsForgetsNobodyThatMayStillRun) {
-  std::ofstream(folder_ / "station.toml")
-      << "[station]\nname = \"cell\"\nbus = \"no bus\"\ncan = \"socketcan:can0\"\ncalibration = \"c\"\n"
-      << "pattern = \"p\"\nviews = \"v\"\nmodel = \"m\"\nfeatures = \"f\"\nresults = \"r\"\n";
+  WriteStation();
   std::ofstream(File()) << "4321 98 120\nrobot 1234 0 99 0\n";
   std::ofstream(folder_ / "log") << "no folder";
   for (int start = 0; start < 2; ++start) {
