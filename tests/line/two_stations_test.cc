@@ -333,6 +333,7 @@ TEST_F(TwoStations, WhatWasGivenUpOrFailedWhileItStoppedIsToldByAll) {
 TEST_F(TwoStations, AReaderOrATerminalThatGoesAwayLeavesTheOrderAsItIs) {
   const OneStation station(Folder(1), "alone", "");
   const std::string tool = std::string(FORGESCAN_BIN_DIR) + "/forgescan", code = (base_ / "code").string();
+  std::signal(SIGHUP, SIG_DFL);  // this test itself may run under nohup
   RunCommand("{ { " + tool + " station up " + station.folder().string() + "; echo $? > " + code +
              "; } | head -n 1; } > /dev/null 2>&1 &");
   ASSERT_TRUE(station.IsUp()) << station.Log();

@@ -53,14 +53,15 @@ std::string LastLine(const std::string& path) {
 }  // namespace
 
 Status ProcessGroup::Start(const std::string& name, const std::vector<std::string>& command) {
+  if (access(command[0].c_str(), X_OK) != 0) {
+    return Fail(ErrorCode::kIo, "{} cannot be started: {}", command[0], std::strerror(errno));
+  }
   std::error_code problem;
   std::filesystem::create_directories(log_folder_, problem);
   const int log = open(LogOf(name).c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
-  if (log < 0 || access(command[0].c_str(), X_OK) != 0) {
-    const int reason = errno;
-    close(log);
-    return Fail(ErrorCode::kIo, "{} cannot be started with its log in {}: {}", command[0], LogOf(name),
-                std::strerror(reason));
+  if (log < 0) {
+    return Fail(ErrorCode::kIo, "{} is not started, as its log {} cannot be written: {}", command[0],
+                LogOf(name), std::strerror(errno));
   }
   std::vector<char*> arguments;
   for (const std::string& word : command) {

@@ -114,21 +114,23 @@ Result<StationLock> StationLock::Take(const std::string& folder, double stop_pat
     }
     struct flock wanted = WholeFile();
     if (fcntl(file.get(), F_OFD_SETLK, &wanted) != 0) {
-      return Fail(ErrorCode::kUnavailable, "station {} is up already; forgescan station down {} stops it",
-                  folder, folder);
+      const bool held = errno == EAGAIN || errno == EACCES;
+      return held ? Fail(ErrorCode::kUnavailable,
+                         "station {} is up already; forgescan station down {} stops it", folder, folder)
+                  : Fail(ErrorCode::kIo, "{} cannot be locked: {}", path, std::strerror(errno));
     }
     if (!IsTheFileAt(path, file.get())) {
       continue;  // the station went down, and its file with it, between open and lock
     }
     StationLock lock(path, std::move(file), stop_patience_s);
     lock.left_behind_ = Parse(ReadAll(lock.file_.get())).services;
-    RETURN_IF_ERROR(lock.Write(lock.left_behind_));  // still named if this process dies, too
+    lock.named_ = lock.Write(lock.left_behind_);  // still named if this process dies, too
     return lock;
   }
 }
 
 StationLock::~StationLock() {
-  if (file_.get() >= 0) {
+  if (file_.get() >= 0 && left_behind_.empty()) {
     std::error_code ignored;  // a file left behind is not locked
     std::filesystem::remove(path_, ignored);
   }
@@ -154,8 +156,10 @@ Status StationLock::WriteText(const std::string& text) const {
   const std::string whole =
       fmt::format("{} {} {:.0f}\n{}", self.pid, self.started_ticks, stop_patience_s_, text);
   const auto size = static_cast<ssize_t>(whole.size());
-  if (pwrite(file_.get(), whole.data(), whole.size(), 0) != size || ftruncate(file_.get(), size) != 0) {
-    return Fail(ErrorCode::kIo, "{}: cannot be written: {}", path_, std::strerror(errno));
+  const ssize_t written = pwrite(file_.get(), whole.data(), whole.size(), 0);
+  if (written != size || ftruncate(file_.get(), size) != 0) {
+    const int reason = written >= 0 && written < size ? ENOSPC : errno;
+    return Fail(ErrorCode::kIo, "{}: cannot be written: {}", path_, std::strerror(reason));
   }
   return {};
 }

@@ -60,17 +60,22 @@ class RunningStation {
   ServiceProcesses services_;
 };
 
-// Held by whoever runs the station.
+// Held by whoever runs the station. Removes the file at its end, unless it names what may still run.
 class StationLock {
  public:
-  // Errors: kUnavailable (somebody else holds it), kIo (not to be written).
+  // Errors: kUnavailable (somebody else holds it), kIo (no such file can be made, or none be locked here).
   static Result<StationLock> Take(const std::string& folder, double stop_patience_s);
   StationLock(StationLock&&) = default;
   StationLock& operator=(StationLock&&) = delete;
   ~StationLock();
 
+  // Of naming this process in the file when it was taken. The lock holds without it, but others do not find
+  // the station until a Write() succeeds.
+  const Status& named() const { return named_; }
   // Services of an earlier supervisor that did not stop in order. They may still run.
   const ServiceProcesses& left_behind() const { return left_behind_; }
+  // None of them runs any more. Until then the file stays for the next one to take.
+  void LeftBehindHaveEnded() { left_behind_.clear(); }
   // Errors: kIo.
   Status Write(const ServiceProcesses& services) const;
   // The last word, for RunningStation::Outcome(). Errors: kIo.
@@ -85,6 +90,7 @@ class StationLock {
   OwnedFd file_;
   double stop_patience_s_;
   ServiceProcesses left_behind_;
+  Status named_;
 };
 
 }  // namespace forgescan

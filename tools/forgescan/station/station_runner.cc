@@ -52,7 +52,8 @@ ServiceWord WordOf(const State& state) {
   return {.service = state.name,
           .session = state.session,
           .starting = state.state == State::STATE_STARTING,
-          .ready = state.state == State::STATE_READY || state.state == State::STATE_WORKING};
+          .ready = state.state == State::STATE_READY || state.state == State::STATE_WORKING,
+          .age_us = state.utime - state.session};
 }
 
 }  // namespace
@@ -81,7 +82,11 @@ Result<std::unique_ptr<StationRunner>> StationRunner::Create(const std::string& 
   ASSIGN_OR_RETURN(SupervisionPolicy policy, SupervisionPolicy::Load(station.file));
   ASSIGN_OR_RETURN(StationLock lock, StationLock::Take(folder, LongestStopS(station, policy)));
   ASSIGN_OR_RETURN(SupervisorLog log, SupervisorLog::Open(LogFolder(folder), echo));
+  if (!lock.named().ok()) {
+    log.Write("station", lock.named().error().message, true);
+  }
   RETURN_IF_ERROR(EndLeftovers(lock.left_behind(), policy, log));
+  lock.LeftBehindHaveEnded();
   std::signal(SIGPIPE, SIG_IGN);  // nobody reads the output any more: no reason to leave the services alone
   ASSIGN_OR_RETURN(auto bus, LcmBus::Open(station.bus_url));
   return std::unique_ptr<StationRunner>(
@@ -125,16 +130,19 @@ ServiceProcesses StationRunner::Processes() const {
   return processes;
 }
 
-// A full disk is told, but ends no station.
+// A full disk is told once, but ends no station; it is tried again until there is room.
 void StationRunner::NoteProcesses() {
   ServiceProcesses now = Processes();
   if (now == noted_) {
     return;
   }
-  if (const Status written = lock_.Write(now); !written.ok()) {
+  const Status written = lock_.Write(now);
+  if (written.ok()) {
+    noted_ = std::move(now);
+  } else if (!note_failed_) {
     log_.Write("station", written.error().message, true);
   }
-  noted_ = std::move(now);
+  note_failed_ = !written.ok();
 }
 
 Status StationRunner::Step() {

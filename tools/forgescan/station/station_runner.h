@@ -80,6 +80,7 @@ class StationRunner {
   Supervisor supervisor_;
   ProcessUsage usage_;
   ServiceProcesses noted_;                // in the lock's file
+  bool note_failed_ = false;              // the last time
   std::vector<std::string> stop_faults_;  // sentences
   ProcessGroup processes_;
 };

@@ -9,6 +9,8 @@ namespace {
 
 using Kind = SupervisorEvent::Kind;
 
+constexpr std::size_t kSessionsEndedKept = 8;
+
 std::int64_t ToUs(double seconds) { return static_cast<std::int64_t>(seconds * 1e6); }
 double ToSeconds(std::int64_t us) { return static_cast<double>(us) * 1e-6; }
 
@@ -108,13 +110,34 @@ void Supervisor::CheckSilence(const std::string& name, Service& service, std::in
   actions.emplace_back(KillProcess{name});
 }
 
+void Supervisor::Forget(Service& service, std::int64_t session) {
+  if (std::find(service.ended.begin(), service.ended.end(), session) != service.ended.end()) {
+    return;
+  }
+  service.ended.push_back(session);
+  if (service.ended.size() > kSessionsEndedKept) {
+    service.ended.pop_front();
+  }
+}
+
+bool Supervisor::IsAnothers(const Service& service, const ServiceWord& word, std::int64_t now_us) {
+  return word.age_us > now_us - service.started_us ||
+         std::find(service.ended.begin(), service.ended.end(), word.session) != service.ended.end();
+}
+
 Supervisor::Actions Supervisor::OnWord(const ServiceWord& word, std::int64_t now_us) {
   const auto found = services_.find(word.service);
-  if (found == services_.end() || found->second.phase != Phase::kRunning ||
-      word.session < found->second.started_us || word.session == found->second.ended_session) {
+  if (found == services_.end()) {
     return {};
   }
   Service& service = found->second;
+  if (service.phase != Phase::kRunning) {
+    Forget(service, word.session);
+    return {};
+  }
+  if (IsAnothers(service, word, now_us)) {
+    return {};
+  }
   service.heard_us = now_us;
   service.session = word.session;
   service.starting = service.starting && word.starting;
@@ -147,7 +170,7 @@ Supervisor::Actions Supervisor::OnEnd(const ProcessEnd& end, std::int64_t now_us
   Service& service = found->second;
   Actions actions{SupervisorEvent{Kind::kCrash, end.service, end.Text()}};
   service.ended_us = now_us;
-  service.ended_session = service.session;
+  Forget(service, service.session);
   service.ready = false;
   service.failures_us.push_back(now_us);
   while (service.failures_us.front() < now_us - ToUs(policy_.restart_window_s)) {

@@ -50,9 +50,10 @@ struct ProcessEnd {
 // What a service said on SERVICE_STATE.
 struct ServiceWord {
   std::string service;
-  std::int64_t session = 0;  // when it began, us
+  std::int64_t session = 0;  // of the process that speaks
   bool starting = false;     // has not said more than STARTING
   bool ready = false;        // READY or WORKING
+  std::int64_t age_us = 0;   // of that process when it spoke, by its own clock
 };
 
 class Supervisor {
@@ -68,8 +69,9 @@ class Supervisor {
   Supervisor(const SupervisionPolicy& policy, const std::vector<Member>& members);
 
   Actions OnTick(std::int64_t now_us);
-  // Words of a session that began before the service was last started are another process's: of the one
-  // that ended, or of one that nobody here has started.
+  // Words of a session heard before, or of a process older than the last start, are another's: of one that
+  // ended, or of one that nobody here has started. Ages are compared and no times of day: a service that was
+  // started after the computer's clock was set has another one than the supervisor.
   Actions OnWord(const ServiceWord& word, std::int64_t now_us);
   Actions OnEnd(const ProcessEnd& end, std::int64_t now_us);
 
@@ -90,7 +92,7 @@ class Supervisor {
     std::int64_t heard_us = 0;       // running: its last word, or its start
     std::int64_t ended_us = 0;       // 0: never
     std::int64_t session = 0;        // of its last word
-    std::int64_t ended_session = 0;  // its words may come after its end
+    std::deque<std::int64_t> ended;  // sessions, the last ones: their words may come after the end
     bool starting = true;
     bool ready = false;
     bool was_ready = false;  // ever
@@ -101,6 +103,8 @@ class Supervisor {
   void AdvanceStage(std::int64_t now_us);
   void Start(const std::string& name, Service& service, std::int64_t now_us, Actions& actions);
   void CheckSilence(const std::string& name, Service& service, std::int64_t now_us, Actions& actions);
+  static void Forget(Service& service, std::int64_t session);
+  static bool IsAnothers(const Service& service, const ServiceWord& word, std::int64_t now_us);
   std::int64_t BackoffUs(std::size_t failures) const;
 
   SupervisionPolicy policy_;

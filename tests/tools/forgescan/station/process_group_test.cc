@@ -116,14 +116,18 @@ TEST_F(ProcessGroupTest, FindsTheLastWordsOfALongLog) {
 TEST_F(ProcessGroupTest, AProgramThatIsNotThereIsAnError) {
   const Status started = group_.Start("ghost", {"/no/such/program"});
   ASSERT_FALSE(started.ok());
-  EXPECT_THAT(started.error().message, HasSubstr("/no/such/program cannot be started"));
+  EXPECT_EQ(started.error().message, "/no/such/program cannot be started: No such file or directory");
+  EXPECT_FALSE(fs::exists(folder_ / "ghost.log"));
 }
 
 TEST_F(ProcessGroupTest, ALogThatCannotBeWrittenIsNamedWithItsReason) {
   ProcessGroup nowhere("/proc/no/such/folder");
   const Status started = nowhere.Start("shell", {"/bin/sh", "-c", "exit 0"});
   ASSERT_FALSE(started.ok());
-  EXPECT_THAT(started.error().message, HasSubstr("shell.log: No such file or directory"));
+  EXPECT_EQ(
+      started.error().message,
+      "/bin/sh is not started, as its log /proc/no/such/folder/shell.log cannot be written: No such file or "
+      "directory");
 }
 
 // A service with the right name that does not end when it is asked to, as one that hangs.

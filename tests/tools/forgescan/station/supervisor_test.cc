@@ -167,11 +167,38 @@ TEST_F(SupervisorTest, LateWordsOfTheDeadCountForNothingWhereTheClockWasSetBack)
 TEST_F(SupervisorTest, WordsOfAProcessItHasNotStartedKeepNobodyAlive) {
   Tick(0);
   for (double s = 0; s < 31; s += 1) {
-    Do(supervisor_.OnWord({"report", At(-1000), false, true}, At(s)));
+    Do(supervisor_.OnWord({"report", At(-1000), false, true, At(s) - At(-1000)}, At(s)));
     EXPECT_THAT(events_, IsEmpty()) << "the report is not ready";
   }
   Tick(30.2);
   EXPECT_THAT(killed_, ElementsAre("report"));
+}
+
+// A service takes the time of day when it starts, the supervisor has that of its own start.
+TEST_F(SupervisorTest, AServiceStartedAfterTheClockWasSetBackIsHeard) {
+  AllUp(0);
+  const std::int64_t dead = sessions_["camera"];
+  Crash("camera", 5);
+  Do(supervisor_.OnWord({"camera", At(-1), false, true, 7'000'000}, At(5)));  // nobody here has started it
+  Tick(5);
+  const std::int64_t session = At(5) - 3600 * kSecondUs;
+  for (double s = 5.1; s < 40; s += 1) {
+    const auto age_us = static_cast<std::int64_t>((s - 5) * 1e6) - 1000;
+    Do(supervisor_.OnWord({"camera", session, false, true, age_us}, At(s)));
+    EXPECT_EQ(events_.size(), s < 6 ? 1u : 0u) << "it is ready, once, at " << s;
+    Say("report", s);
+    Say("robot", s);
+    Tick(s);
+    EXPECT_THAT(killed_, IsEmpty());
+  }
+  for (double s = 40; s < 45; s += 1) {  // of these two no word keeps it alive
+    Do(supervisor_.OnWord({"camera", dead, false, true, 4'000'000}, At(s)));
+    Do(supervisor_.OnWord({"camera", At(-1), false, true, 7'000'000}, At(s)));
+    Say("report", s);
+    Say("robot", s);
+  }
+  Tick(45);
+  EXPECT_THAT(killed_, ElementsAre("camera"));
 }
 
 TEST_F(SupervisorTest, WaitsLongerFromFailureToFailure) {
