@@ -140,7 +140,10 @@ void DropForSpace(std::vector<Candidate>& candidates, const RetentionRules& rule
         enough.push_back(&candidate);
       }
     }
-    for (Candidate* candidate : missing_bytes > 0 ? std::vector<Candidate*>() : enough) {
+    if (missing_bytes > 0) {
+      continue;
+    }
+    for (Candidate* candidate : enough) {
       Delete(*candidate, fmt::format("less than {} bytes are free", rules.min_free_bytes), plan);
     }
   }
