@@ -17,7 +17,7 @@ struct ClassifyOptions {
 };
 
 // Indices of the points of the part, ascending; all others are foreign. A point that is not finite is
-// foreign. Cost: tools/bench/registration_bench.cc.
+// foreign. Cost: tests/bench/registration_bench.cc.
 std::vector<std::uint32_t> FindPartPoints(const PointCloud& scan, const RegistrationModel& model,
                                           const Eigen::Isometry3d& model_from_scan,
                                           const ClassifyOptions& options);

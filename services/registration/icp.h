@@ -67,7 +67,7 @@ struct Registration {
 // kInvalidArgument (options, arrays of different length, start not finite); kDegenerate (too few points in
 // the box, or the points do not fix the pose); kNotConverged; kUntrusted (too few inliers, or a result
 // farther from the start than the start may be off). Never a pose that did not converge. Cost:
-// tools/bench/registration_bench.cc.
+// tests/bench/registration_bench.cc.
 Result<Registration> RegisterScan(const PointCloud& scan, const RegistrationModel& model,
                                   const Eigen::Isometry3d& start, const IcpOptions& options);
 

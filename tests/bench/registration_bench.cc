@@ -55,9 +55,9 @@ void BM_Classify(benchmark::State& state) {
   }
 }
 
-BENCHMARK(BM_BuildModel)->Unit(benchmark::kMillisecond);
-BENCHMARK(BM_Register)->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->UseRealTime();
-BENCHMARK(BM_Classify)->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK(BM_BuildModel)->Name("model_preparation/ours")->Unit(benchmark::kMillisecond);
+BENCHMARK(BM_Register)->Name("registration/ours")->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK(BM_Classify)->Name("classification/ours")->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->UseRealTime();
 
 }  // namespace
 }  // namespace forgescan
