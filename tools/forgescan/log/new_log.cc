@@ -83,7 +83,8 @@ void NewLog::AddChangedChannels() {
 }
 
 std::vector<fsmsg::recording_gap_t> NewLog::ShortGaps() const {
-  std::vector<fsmsg::recording_gap_t> gaps(gaps_.begin(), gaps_.begin() + std::min(gaps_.size(), kMaxGaps));
+  const auto shown = static_cast<std::ptrdiff_t>(std::min(gaps_.size(), kMaxGaps));
+  std::vector<fsmsg::recording_gap_t> gaps(gaps_.begin(), gaps_.begin() + shown);
   for (fsmsg::recording_gap_t& gap : gaps) {
     gap.channel.resize(std::min(gap.channel.size(), kMaxLogChannelBytes));
     gap.reason.resize(std::min(gap.reason.size(), kMaxReasonBytes));
