@@ -14,6 +14,7 @@
 #include "services/common/model/bundle_file.h"
 #include "services/common/model/model_import.h"
 #include "services/common/model/stl_file.h"
+#include "services/recorder/recording_name.h"
 #include "services/robot/part_memory.h"
 #include "tests/fuzz/readers.h"
 
@@ -94,6 +95,12 @@ TEST(Found, ACalibrationMatrixWithoutItsNumbersIsRefused) {
   const auto calibration = LoadStereoCalibration(ScratchFile("stereo.yaml", text));
   ASSERT_FALSE(calibration.ok());
   EXPECT_THAT(calibration.error().message, HasSubstr("rows times cols"));
+}
+
+// Retention takes its files by their names: other spellings of a number are not the recorder's.
+TEST(Found, RecordingsHaveOneNameOnly) {
+  EXPECT_TRUE(ParseRecordingName("20261122T141508.123456Z_part000043_OK.lcmlog").has_value());
+  EXPECT_FALSE(ParseRecordingName("20261122T141508.123456Z_part00000043_OK.lcmlog").has_value());
 }
 
 // Cells of such a mesh cannot be numbered.

@@ -106,7 +106,7 @@ std::vector<Reader> Readers() {
        {kAsciiMesh, BinaryMesh("binary_little_endian"), BinaryMesh("binary_big_endian")},
        mesh},
       {"pose",
-       10'000,
+       5000,
        {"1 0 0 5\n0 1 0 6\n0 0 1 7\n0 0 0 1\n", "0,-1,0,1,1,0,0,2,0,0,1,3,0,0,0,1"},
        ReadPoseFile}};
 }

@@ -119,11 +119,11 @@ std::vector<Reader> Readers() {
     return Judge(ParseFeatures(bytes, "features.toml"), "features.toml", FeaturesProblem);
   };
   const std::string bundle = EncodeBundle(Axle());
-  return {{"stl", 20'000, {kAsciiStl, BinaryStl()}, model("model.stl")},
-          {"ply_model", 10'000, {kPlyModel}, model("model.ply")},
-          {"bundle", 3000, {bundle}, model("model.bundle")},
+  return {{"stl", 5000, {kAsciiStl, BinaryStl()}, model("model.stl")},
+          {"ply_model", 4000, {kPlyModel}, model("model.ply")},
+          {"bundle", 1000, {bundle}, model("model.bundle")},
           {"bundle_mended", 10'000, {bundle}, mended},
-          {"step", 60, {AxleStep()}, model("model.step")},
+          {"step", 40, {AxleStep()}, model("model.step")},
           {"features", 10'000, {kFeatures}, features}};
 }
 

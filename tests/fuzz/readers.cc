@@ -55,7 +55,8 @@ const std::filesystem::path& ScratchFolder() {
 
 std::string ScratchFile(std::string_view name, std::string_view bytes) {
   const std::filesystem::path path = ScratchFolder() / name;
-  std::ofstream file(path, std::ios::binary | std::ios::trunc);
+  std::filesystem::remove(path);  // ext4 writes a file to disk that is cut to nothing and written again
+  std::ofstream file(path, std::ios::binary);
   file.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
   return path.string();
 }

@@ -225,11 +225,11 @@ constexpr char kRecordings[] =
 
 std::vector<Reader> Readers() {
   return {
-      {"station", 3000, {RepositoryFile("stations/template/station.toml")}, ReadStation},
-      {"cell", 1500, {RepositoryFile("stations/virtual/cell.toml")}, ReadCell},
+      {"station", 1500, {RepositoryFile("stations/template/station.toml")}, ReadStation},
+      {"cell", 1000, {RepositoryFile("stations/virtual/cell.toml")}, ReadCell},
       {"calibration", 3000, {CalibrationText()}, ReadCalibration},
       {"pattern", 5000, {kPattern}, ReadPattern},
-      {"views", 5000, {kViews}, ReadViews},
+      {"views", 3000, {kViews}, ReadViews},
       {"part_memory", 3000, {"7 1700000000000000 10 3 0 0\n8 1700000000000001 10 10 1 1\n"}, ReadPartMemory},
       {"kept_parts", 3000, {KeptPartsText()}, ReadKeptParts},
       {"history", 500, {HistoryBytes()}, ReadHistory},

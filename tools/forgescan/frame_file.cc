@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <cstdio>
+#include <exception>
 #include <opencv2/imgcodecs.hpp>
 
 namespace forgescan {
@@ -44,7 +45,7 @@ Result<cv::Mat> ReadFrame(const std::filesystem::path& path) {
   cv::Mat frame;
   try {
     frame = cv::imread(path.string(), cv::IMREAD_UNCHANGED);
-  } catch (const cv::Exception&) {  // sizes that no image has
+  } catch (const std::exception&) {  // sizes that no image has
     return Fail(ErrorCode::kFormat, "{}: is not a readable image", path.string());
   }
   if (frame.empty() || complaints.any()) {

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <exception>
 #include <fstream>
 #include <iterator>
 #include <opencv2/core.hpp>
@@ -231,7 +232,7 @@ Result<StereoCalibration> LoadStereoCalibration(const std::filesystem::path& pat
       return Fail(status.error().code, "{}: {}", name, status.error().message);
     }
     return calibration;
-  } catch (const cv::Exception&) {
+  } catch (const std::exception&) {  // cv::Exception, and what its parsers do not catch themselves
     return Fail(ErrorCode::kFormat, "{}: is not a well-formed OpenCV calibration file", name);
   }
 }
