@@ -37,7 +37,7 @@ std::vector<Reader> Readers() {
     for (const int type : {CV_8UC1, CV_16UC1}) seeds.push_back(Encoded(ending, type));
   }
   seeds.push_back(Encoded(".bmp", CV_8UC1));
-  return {{"image", 2000, seeds, ReadImage}};
+  return {{"image", 10'000, seeds, ReadImage}};
 }
 
 }  // namespace forgescan::fuzz
