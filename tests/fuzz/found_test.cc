@@ -17,6 +17,7 @@
 #include "services/recorder/recording_name.h"
 #include "services/robot/part_memory.h"
 #include "tests/fuzz/readers.h"
+#include "tools/forgescan/image_header.h"
 
 namespace forgescan::fuzz {
 namespace {
@@ -101,6 +102,18 @@ TEST(Found, ACalibrationMatrixWithoutItsNumbersIsRefused) {
 TEST(Found, RecordingsHaveOneNameOnly) {
   EXPECT_TRUE(ParseRecordingName("20261122T141508.123456Z_part000043_OK.lcmlog").has_value());
   EXPECT_FALSE(ParseRecordingName("20261122T141508.123456Z_part00000043_OK.lcmlog").has_value());
+}
+
+// Codecs made room for the pixels that a header claims: 3 GB for a file of 30 bytes.
+TEST(Found, AnImageSaysHowLargeItIsBeforeRoomIsMade) {
+  EXPECT_EQ(ClaimedPixels("P5\n# by hand\n60000 50000\n255\n"), 3'000'000'000U);
+  EXPECT_EQ(ClaimedPixels("P5 640 480 255 "), 307'200U);
+  const std::string png = std::string("\x89PNG\r\n\x1A\n\0\0\0\rIHDR", 16);
+  EXPECT_EQ(ClaimedPixels(png + std::string("\0\1\0\0\0\0\0\2", 8)), 131'072U);
+  EXPECT_EQ(ClaimedPixels(png), std::nullopt);
+  const std::string entries("\2\0\0\1\4\0\1\0\0\0\0\0\1\0\1\1\3\0\1\0\0\0\7\0\0\0", 26);
+  EXPECT_EQ(ClaimedPixels(std::string("II*\0\10\0\0\0", 8) + entries), 65'536U * 7);
+  EXPECT_EQ(ClaimedPixels("a text"), std::nullopt);
 }
 
 // Cells of such a mesh cannot be numbered.

@@ -5,9 +5,15 @@
 #include <cstdio>
 #include <exception>
 #include <opencv2/imgcodecs.hpp>
+#include <string>
+
+#include "services/common/input_file.h"
+#include "tools/forgescan/image_header.h"
 
 namespace forgescan {
 namespace {
+
+constexpr std::uint64_t kMaxPixels = 200'000'000;  // more than any camera; codecs make room before they look
 
 // Image codecs write their complaints on stderr themselves. While this lives they land here instead, so that
 // the user gets one sentence, and a complaint about a picture that was decoded all the same (a cut off JPEG)
@@ -40,6 +46,11 @@ class CodecComplaints {
 Result<cv::Mat> ReadFrame(const std::filesystem::path& path) {
   if (!std::filesystem::is_regular_file(path)) {
     return Fail(ErrorCode::kNotFound, "{}: there is no such frame", path.string());
+  }
+  ASSIGN_OR_RETURN(const std::string bytes, ReadInputFile(path));
+  if (const auto pixels = ClaimedPixels(bytes); pixels.value_or(0) > kMaxPixels) {
+    return Fail(ErrorCode::kFormat, "{}: claims {} pixels, allowed up to {}", path.string(), *pixels,
+                kMaxPixels);
   }
   const CodecComplaints complaints;
   cv::Mat frame;
