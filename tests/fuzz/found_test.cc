@@ -116,6 +116,14 @@ TEST(Found, AnImageSaysHowLargeItIsBeforeRoomIsMade) {
   EXPECT_EQ(ClaimedPixels("a text"), std::nullopt);
 }
 
+// OpenCV's YAML parser ran for ever.
+TEST(Found, ACalibrationOfSeveralDocumentsIsRefused) {
+  const std::string text =
+      "%YAML:1.r; %YA!!opencv-matrix\n  \n   cols: 3\n Y0\n--.0\n----\nK1.0\n---\nK,: "
+      "en\n\xB5lc%Y:0.0\n---\n\xB5height: 120\n";
+  EXPECT_FALSE(LoadStereoCalibration(ScratchFile("stereo.yaml", text)).ok());
+}
+
 // Cells of such a mesh cannot be numbered.
 TEST(Found, AnStlBeyondAHundredMetresIsRefused) {
   const auto mesh = DecodeStl(

@@ -39,6 +39,15 @@ bool NestsLittle(const std::string& text) {
   return text.size() <= kMaxFileBytes && std::count(text.begin(), text.end(), '<') <= kMaxTags;
 }
 
+// OpenCV's YAML parser may run for ever on a file with several documents or directives; it writes one of
+// each.
+bool IsOneDocument(const std::string& text) {
+  if (!text.starts_with("%YAML")) return true;  // XML or JSON
+  const std::size_t start = text.find("---");
+  return std::count(text.begin(), text.end(), '%') == 1 &&
+         (start == std::string::npos || text.find("---", start + 3) == std::string::npos);
+}
+
 // OpenCV makes room for rows x cols numbers before it looks how many there are.
 bool HasItsNumbers(const cv::FileNode& matrix) {
   const cv::FileNode rows = matrix["rows"], columns = matrix["cols"], data = matrix["data"];
@@ -220,6 +229,10 @@ Result<StereoCalibration> LoadStereoCalibration(const std::filesystem::path& pat
   const std::string text{std::istreambuf_iterator<char>(stream), {}};
   if (!NestsLittle(text)) {
     return Fail(ErrorCode::kFormat, "{}: is not a calibration file: larger than 1 MB, or nested deeply",
+                name);
+  }
+  if (!IsOneDocument(text)) {
+    return Fail(ErrorCode::kFormat, "{}: is not a calibration file: one %YAML line and one --- are allowed",
                 name);
   }
   try {
