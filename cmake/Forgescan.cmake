@@ -26,6 +26,11 @@ if(FORGESCAN_SANITIZE)
   target_link_options(forgescan_options INTERFACE -fsanitize=${FORGESCAN_SANITIZE})
 endif()
 
+# Under clang its other warnings are not ours to obey.
+if(FORGESCAN_FUZZ)
+  target_compile_options(forgescan_options INTERFACE -Wno-error -w -fsanitize=fuzzer-no-link)
+endif()
+
 target_link_libraries(forgescan_options INTERFACE fmt::fmt)
 
 # What nearly every source includes is compiled once, for the product here and for the tests in tests/: it takes a third off a

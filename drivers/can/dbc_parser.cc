@@ -8,6 +8,8 @@
 namespace forgescan {
 namespace {
 
+constexpr std::size_t kLongestLine = 1000;  // std::regex takes a piece of the stack for every character
+
 constexpr const char* kNumber = R"(([-+0-9.eE]+))";
 
 class Parser {
@@ -168,6 +170,10 @@ Result<DbcFile> ParseDbc(std::string_view text) {
     text.remove_prefix(std::min(end + 1, text.size()));
     while (!line.empty() && (line.back() == '\r' || line.back() == ' ')) {
       line.pop_back();
+    }
+    if (line.size() > kLongestLine) {
+      return Fail(ErrorCode::kFormat, "DBC line {}: {} characters, allowed {}", number, line.size(),
+                  kLongestLine);
     }
     Status status;
     try {  // std::sto* throw on numbers out of range

@@ -45,10 +45,25 @@ struct LocatedFormat {
   std::source_location where;
 };
 
+// Sentences quote what a file, a wire or a user says: that must not speak to the terminal nor fill it.
+// Control characters but for the end of a line become '?'; of a text of more than 4000 bytes the rest is left
+// out.
+inline std::string Quotable(std::string text) {
+  constexpr std::size_t kLongest = 4000;
+  if (text.size() > kLongest) {
+    text.replace(kLongest, std::string::npos, " ...");
+  }
+  for (char& c : text) {
+    const bool is_control = (static_cast<unsigned char>(c) < ' ' && c != '\n') || c == '\x7F';
+    c = is_control ? '?' : c;
+  }
+  return text;
+}
+
 // Builds an Error: return Fail(ErrorCode::kFormat, "{}: {} is not a PLY file", path, what);
 template <typename... Args>
 [[nodiscard]] Error Fail(ErrorCode code, LocatedFormat<std::type_identity_t<Args>...> text, Args&&... args) {
-  return Error{code, fmt::format(text.format, std::forward<Args>(args)...), text.where};
+  return Error{code, Quotable(fmt::format(text.format, std::forward<Args>(args)...)), text.where};
 }
 
 template <typename T>

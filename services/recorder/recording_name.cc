@@ -98,6 +98,7 @@ std::string NameOf(const RecordingName& name) {
 }
 
 std::optional<RecordingName> ParseRecordingName(std::string_view text) {
+  const std::string_view whole = text;
   RecordingName name;
   name.closed = !TakeEnd(text, kOpen);
   if (!TakeEnd(text, kSuffix) || text.size() < kTimeLength) {
@@ -110,7 +111,7 @@ std::optional<RecordingName> ParseRecordingName(std::string_view text) {
   }
   name.utime = *utime;
   name.complete = rest.empty() ? name.closed : name.complete;
-  return name;
+  return NameOf(name) == whole ? std::optional(name) : std::nullopt;  // no other spelling of a time or number
 }
 
 }  // namespace forgescan

@@ -24,7 +24,8 @@ Status PartMemory::Recall() {
                                          remembered.captured >> remembered.scanned >> remembered.sorted);
     if (!whole || part < 1 || (words >> rest)) {
       return Fail(ErrorCode::kFormat,
-                  "{}: \"{}\" is no part: number from 1, arrival, views, captured, 0/1, 0/1", path_, line);
+                  "{}: \"{}\" is no part: number from 1, arrival, views, captured, 0/1, 0/1", path_,
+                  line.substr(0, 80));
     }
     read.Insert(part, remembered);
   }

@@ -1,13 +1,10 @@
 // forgescan reconstruct: image files of one view -> cloud.ply and, on request, what is known about its
 // quality.
-#include <unistd.h>
-
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <opencv2/imgcodecs.hpp>
 #include <string>
 #include <thread>
 #include <vector>
@@ -16,6 +13,7 @@
 #include "services/common/output_file.h"
 #include "services/reconstruction/reconstruct.h"
 #include "tools/forgescan/command.h"
+#include "tools/forgescan/frame_file.h"
 #include "tools/forgescan/output_files.h"
 
 namespace forgescan {
@@ -30,47 +28,6 @@ struct ReconstructArguments {
   std::string json;
   ReconstructionConfig config;
 };
-
-// Image codecs write their complaints on stderr themselves. While this lives they land here instead, so that
-// the user gets one sentence, and a complaint about a picture that was decoded all the same (a cut off JPEG)
-// is not lost.
-class CodecComplaints {
- public:
-  CodecComplaints() : file_(std::tmpfile()), stderr_(dup(STDERR_FILENO)) {
-    if (file_ != nullptr) {
-      dup2(fileno(file_), STDERR_FILENO);
-    }
-  }
-  CodecComplaints(const CodecComplaints&) = delete;
-  CodecComplaints& operator=(const CodecComplaints&) = delete;
-  ~CodecComplaints() {
-    dup2(stderr_, STDERR_FILENO);
-    close(stderr_);
-    if (file_ != nullptr) {
-      std::fclose(file_);
-    }
-  }
-  bool any() const { return file_ != nullptr && lseek(fileno(file_), 0, SEEK_END) > 0; }
-
- private:
-  std::FILE* file_;
-  int stderr_;
-};
-
-Result<cv::Mat> ReadFrame(const std::filesystem::path& path) {
-  if (!std::filesystem::is_regular_file(path)) {
-    return Fail(ErrorCode::kNotFound, "{}: there is no such frame", path.string());
-  }
-  const CodecComplaints complaints;
-  cv::Mat frame = cv::imread(path.string(), cv::IMREAD_UNCHANGED);
-  if (frame.empty() || complaints.any()) {
-    return Fail(ErrorCode::kFormat, "{}: is not a readable image, or is cut off", path.string());
-  }
-  if (frame.type() != CV_8UC1 && frame.type() != CV_16UC1) {
-    return Fail(ErrorCode::kFormat, "{}: is not a grey image of 8 or 16 bit", path.string());
-  }
-  return frame;
-}
 
 Result<std::vector<cv::Mat>> ReadFrames(const std::filesystem::path& directory, const PatternSet& pattern) {
   std::vector<cv::Mat> frames;

@@ -58,7 +58,9 @@ bool StreamReceiver::EnterSession(std::int64_t session, std::int64_t first_seque
 
 void StreamReceiver::OnMessage(ByteView bytes) {
   const Result<StreamHeader> header = CheckStreamHeader(bytes);
-  if (!header.ok()) {
+  const bool sane =
+      header.ok() && header->sequence >= 1 && header->sequence < std::numeric_limits<std::int64_t>::max();
+  if (!sane) {
     ++counters_.damaged;
     return;
   }

@@ -4,6 +4,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
+#include <exception>
+#include <fstream>
+#include <iterator>
 #include <opencv2/core.hpp>
 #include <string>
 #include <utility>
@@ -15,11 +19,56 @@ constexpr double kOrthonormalTolerance =
     1e-6;  // a rotation printed with 8 digits passes, one with 4 does not
 constexpr double kMaxPixelAspect = 0.005;
 
+// OpenCV's parsers call themselves for every level of nesting, and know no limit. Real files have three
+// levels.
+constexpr std::size_t kMaxFileBytes = 1'000'000;
+constexpr std::size_t kLongestLine =
+    10'000;  // "- - -" nests within a line, else every level indents its lines
+constexpr int kDeepestBrackets = 100;
+constexpr std::ptrdiff_t kMaxTags = 5000;  // of XML
+
+bool NestsLittle(const std::string& text) {
+  std::size_t line = 0;
+  int depth = 0;
+  for (const char c : text) {
+    line = c == '\n' ? 0 : line + 1;
+    depth += c == '[' || c == '{' ? 1 : 0;
+    depth -= c == ']' || c == '}' ? 1 : 0;
+    if (line > kLongestLine || depth > kDeepestBrackets) return false;
+  }
+  return text.size() <= kMaxFileBytes && std::count(text.begin(), text.end(), '<') <= kMaxTags;
+}
+
+// OpenCV's YAML parser may run for ever on a file with several documents or directives; it writes one of
+// each.
+bool IsOneDocument(const std::string& text) {
+  if (!text.starts_with("%YAML")) return true;  // XML or JSON
+  const std::size_t start = text.find("---");
+  return std::count(text.begin(), text.end(), '%') == 1 &&
+         (start == std::string::npos || text.find("---", start + 3) == std::string::npos);
+}
+
+// OpenCV makes room for rows x cols numbers before it looks how many there are.
+bool HasItsNumbers(const cv::FileNode& matrix) {
+  const cv::FileNode rows = matrix["rows"], columns = matrix["cols"], data = matrix["data"];
+  if (!rows.isInt() || !columns.isInt() || !data.isSeq()) {
+    return false;
+  }
+  const auto row_count = static_cast<std::int64_t>(static_cast<int>(rows));
+  const auto column_count = static_cast<std::int64_t>(static_cast<int>(columns));
+  return row_count > 0 && column_count > 0 &&
+         static_cast<std::uint64_t>(row_count * column_count) == data.size();
+}
+
 Result<std::vector<double>> ReadNumbers(const cv::FileStorage& file, const std::string& key,
                                         const std::string& name) {
   const cv::FileNode node = file[key];
   if (node.empty()) {
     return Fail(ErrorCode::kFormat, "{}: the entry {} is missing", name, key);
+  }
+  if (!node.isMap() || !HasItsNumbers(node)) {
+    return Fail(ErrorCode::kFormat, "{}: the entry {} is not a matrix with rows times cols numbers", name,
+                key);
   }
   const cv::Mat stored = node.mat();
   if (stored.empty() || stored.channels() != 1) {
@@ -176,8 +225,18 @@ Result<StereoCalibration> LoadStereoCalibration(const std::filesystem::path& pat
   if (!std::filesystem::is_regular_file(path)) {
     return Fail(ErrorCode::kNotFound, "{}: there is no such calibration file", name);
   }
+  std::ifstream stream(path, std::ios::binary);
+  const std::string text{std::istreambuf_iterator<char>(stream), {}};
+  if (!NestsLittle(text)) {
+    return Fail(ErrorCode::kFormat, "{}: is not a calibration file: larger than 1 MB, or nested deeply",
+                name);
+  }
+  if (!IsOneDocument(text)) {
+    return Fail(ErrorCode::kFormat, "{}: is not a calibration file: one %YAML line and one --- are allowed",
+                name);
+  }
   try {
-    const cv::FileStorage file(name, cv::FileStorage::READ);
+    const cv::FileStorage file(text, cv::FileStorage::READ | cv::FileStorage::MEMORY);
     if (!file.isOpened()) {
       return Fail(ErrorCode::kFormat, "{}: is not an OpenCV calibration file", name);
     }
@@ -186,7 +245,7 @@ Result<StereoCalibration> LoadStereoCalibration(const std::filesystem::path& pat
       return Fail(status.error().code, "{}: {}", name, status.error().message);
     }
     return calibration;
-  } catch (const cv::Exception&) {
+  } catch (const std::exception&) {  // cv::Exception, and what its parsers do not catch themselves
     return Fail(ErrorCode::kFormat, "{}: is not a well-formed OpenCV calibration file", name);
   }
 }

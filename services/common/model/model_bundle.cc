@@ -17,7 +17,8 @@ Status CheckFace(const ModelBundle& bundle, std::size_t i, std::uint32_t expecte
     return Fail(ErrorCode::kInvalidArgument, "face {} ('{}') starts at triangle {}, expected {}", i,
                 face.name, face.first_triangle, expected_first);
   }
-  if (!face.point.allFinite() || !face.direction.allFinite() || !(face.radius_mm >= 0)) {
+  if (!face.point.allFinite() || !face.direction.allFinite() || !(face.radius_mm >= 0) ||
+      !std::isfinite(face.radius_mm)) {
     return Fail(ErrorCode::kInvalidArgument, "face {} ('{}') has parameters that are not finite", i,
                 face.name);
   }
@@ -76,10 +77,14 @@ Status Check(const ModelBundle& bundle) {
                   bundle.vertices.size());
     }
   }
-  if (!(bundle.spacing_mm > 0 && bundle.resolution_mm >= 0 && bundle.chord_error_mm >= 0)) {
-    return Fail(ErrorCode::kInvalidArgument,
-                "the model's spacing is {} mm and its resolution {} mm, expected > 0 and >= 0",
-                bundle.spacing_mm, bundle.resolution_mm);
+  const bool finite = std::isfinite(bundle.spacing_mm) && std::isfinite(bundle.resolution_mm) &&
+                      std::isfinite(bundle.chord_error_mm);
+  if (!finite || !(bundle.spacing_mm > 0 && bundle.resolution_mm >= 0 && bundle.chord_error_mm >= 0)) {
+    return Fail(
+        ErrorCode::kInvalidArgument,
+        "the model's spacing is {} mm, its resolution {} mm and its chord error {} mm, expected finite "
+        "numbers > 0, >= 0 and >= 0",
+        bundle.spacing_mm, bundle.resolution_mm, bundle.chord_error_mm);
   }
   return CheckFaces(bundle);
 }

@@ -19,11 +19,16 @@ Result<ModelBundle> Finish(ModelBundle bundle, double spacing_mm) {
   return DecodeBundle(EncodeBundle(sampled));
 }
 
+// What is made of a file's content knows no file; its error then gets the name.
+Result<ModelBundle> Named(Result<ModelBundle> bundle, const std::filesystem::path& path) {
+  if (bundle.ok()) return bundle;
+  return Fail(bundle.error().code, "{}: {}", path.string(), bundle.error().message);
+}
+
 Result<ModelBundle> LoadStl(const std::filesystem::path& path, double spacing_mm) {
   ASSIGN_OR_RETURN(const std::string bytes, ReadWholeFile(path));
-  auto mesh = DecodeStl(bytes);
-  if (!mesh.ok()) return Fail(mesh.error().code, "{}: {}", path.string(), mesh.error().message);
-  return ModelFromMesh(*mesh, spacing_mm);
+  const auto mesh = DecodeStl(bytes);
+  return Named(mesh.ok() ? ModelFromMesh(*mesh, spacing_mm) : mesh.error(), path);
 }
 
 }  // namespace
@@ -54,11 +59,11 @@ Result<ModelBundle> LoadModel(const std::filesystem::path& path, const ModelImpo
   if (suffix == ".stl") return LoadStl(path, options.spacing_mm);
   if (suffix == ".ply") {
     ASSIGN_OR_RETURN(const TriangleMesh mesh, ReadTriangleMesh(path));
-    return ModelFromMesh(mesh, options.spacing_mm);
+    return Named(ModelFromMesh(mesh, options.spacing_mm), path);
   }
   if (suffix == ".step" || suffix == ".stp") {
     ASSIGN_OR_RETURN(ModelBundle bundle, ReadStep(path, options.tessellation));
-    return Finish(std::move(bundle), options.spacing_mm);
+    return Named(Finish(std::move(bundle), options.spacing_mm), path);
   }
   return Fail(ErrorCode::kInvalidArgument, "{}: a model is a .step, .stp, .stl, .ply or .bundle file",
               path.string());

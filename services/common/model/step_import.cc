@@ -28,6 +28,7 @@
 #include <XSControl_TransferReader.hxx>
 #include <XSControl_WorkSession.hxx>
 #include <algorithm>
+#include <exception>
 #include <map>
 #include <set>
 
@@ -246,6 +247,8 @@ Result<ModelBundle> ReadStep(const std::filesystem::path& path, const Tessellati
   } catch (const Standard_Failure& failure) {
     return Fail(ErrorCode::kFormat, "{}: OpenCASCADE cannot use it: {}", path.string(),
                 failure.GetMessageString());
+  } catch (const std::exception& failure) {
+    return Fail(ErrorCode::kFormat, "{}: OpenCASCADE cannot use it: {}", path.string(), failure.what());
   }
 }
 

@@ -13,6 +13,7 @@ namespace {
 
 constexpr std::size_t kBinaryHeader = 84;  // 80 bytes of comment and the u32 count
 constexpr std::size_t kBinaryTriangle = 50;
+constexpr float kMaxCoordinateMm = 1e5F;  // as in a cloud: beyond, single precision does not resolve 0.01 mm
 
 using Corners = std::vector<Eigen::Vector3f>;  // three per triangle
 
@@ -20,6 +21,10 @@ Result<TriangleMesh> Weld(const Corners& corners) {
   if (corners.empty()) return Fail(ErrorCode::kFormat, "the STL file has no triangles");
   for (std::size_t i = 0; i < corners.size(); ++i) {
     if (!corners[i].allFinite()) return Fail(ErrorCode::kFormat, "STL triangle {} is not finite", i / 3);
+    if (const float largest = corners[i].cwiseAbs().maxCoeff(); largest > kMaxCoordinateMm) {
+      return Fail(ErrorCode::kFormat, "STL triangle {} has the coordinate {}, allowed up to {} mm", i / 3,
+                  largest, kMaxCoordinateMm);
+    }
   }
   std::vector<std::uint32_t> order(corners.size());
   std::iota(order.begin(), order.end(), 0U);

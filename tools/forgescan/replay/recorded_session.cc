@@ -136,7 +136,11 @@ Status RecordedSession::AddAddition(const LogReader& log, const LogEntry& entry)
   }
   if (logs_.empty()) {
     opened_ = std::move(opened);
-    ASSIGN_OR_RETURN(types_, LcmTypes::Parse(opened_.types));
+    auto types = LcmTypes::Parse(opened_.types);
+    if (!types.ok()) {
+      return Fail(ErrorCode::kFormat, "{}: its message types: {}", log.path(), types.error().message);
+    }
+    types_ = std::move(*types);
   }
   return {};
 }
