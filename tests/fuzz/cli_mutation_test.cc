@@ -29,7 +29,7 @@ struct Case {
   std::vector<std::string> damaged;          // of the files, one in each run
   std::string arguments;
   std::vector<std::string> outputs;
-  int runs = 12;
+  int runs = 4;
   int exit_code = 0;        // with good files
   bool keeps_rest = false;  // of a damaged file what is good is written, whatever the exit code
 };
