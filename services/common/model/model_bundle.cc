@@ -81,6 +81,7 @@ Status Check(const ModelBundle& bundle) {
                 "the model's spacing is {} mm and its resolution {} mm, expected > 0 and >= 0",
                 bundle.spacing_mm, bundle.resolution_mm);
   }
+  RETURN_IF_ERROR(Check(bundle.grid.arrays(), bundle.triangles.size()));
   return CheckFaces(bundle);
 }
 
