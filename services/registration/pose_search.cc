@@ -6,6 +6,7 @@
 #include <numeric>
 #include <optional>
 
+#include "services/common/parallel_blocks.h"
 #include "services/registration/correspondences.h"
 #include "services/registration/icp_stages.h"
 #include "services/registration/rival_poses.h"
@@ -81,21 +82,32 @@ struct Round {
   int iterations;
 };
 
-// A short alignment of each, best first. One that fails is left out.
-std::vector<Candidate> AlignAll(const Round& round, const std::vector<Eigen::Isometry3d>& starts,
-                                const IcpOptions& options) {
-  IcpOptions rough = options;
+// A short alignment from there; nothing if it fails.
+std::optional<Candidate> AlignOne(const Round& round, const Eigen::Isometry3d& start,
+                                  const IcpOptions& options) {
   const double reach_mm = round.model.reach_mm();
+  IcpOptions rough = options;
+  rough.threads = 1;
   rough.max_iterations = round.iterations;
   rough.start_translation_mm = std::max(options.start_translation_mm, kFloorShare * reach_mm);
+  const auto aligned = AlignCoarse(round.sample, round.model, rough, {start, 0, kGateShare * reach_mm});
+  if (!aligned.ok()) return std::nullopt;
+  const std::vector<float> distances = CappedDistances(round.sample, round.model, aligned->model_from_scan,
+                                                       kScoreCapShare * reach_mm, rough.threads);
+  const double sum = std::accumulate(distances.begin(), distances.end(), 0.0);
+  return Candidate{aligned->model_from_scan, sum / static_cast<double>(distances.size())};
+}
+
+// From each of them, the best first.
+std::vector<Candidate> AlignAll(const Round& round, const std::vector<Eigen::Isometry3d>& starts,
+                                const IcpOptions& options) {
+  std::vector<std::optional<Candidate>> aligned(starts.size());
+  ForEachBlock(starts.size(), 1, options.threads, [&](std::size_t i, std::size_t, std::size_t) {
+    aligned[i] = AlignOne(round, starts[i], options);
+  });
   std::vector<Candidate> candidates;
-  for (const Eigen::Isometry3d& start : starts) {
-    const auto aligned = AlignCoarse(round.sample, round.model, rough, {start, 0, kGateShare * reach_mm});
-    if (!aligned.ok()) continue;
-    const std::vector<float> distances = CappedDistances(round.sample, round.model, aligned->model_from_scan,
-                                                         kScoreCapShare * reach_mm, options.threads);
-    const double sum = std::accumulate(distances.begin(), distances.end(), 0.0);
-    candidates.push_back({aligned->model_from_scan, sum / static_cast<double>(distances.size())});
+  for (const auto& candidate : aligned) {
+    if (candidate) candidates.push_back(*candidate);
   }
   std::stable_sort(candidates.begin(), candidates.end(),
                    [](const Candidate& a, const Candidate& b) { return a.score_mm < b.score_mm; });

@@ -104,6 +104,7 @@ std::optional<RivalPose> Settle(const Search& search, const Eigen::Isometry3d& f
   IcpOptions options = search.options;
   options.max_iterations = kRivalIterations;
   options.min_eigenvalue = 0;
+  options.threads = 1;  // so few points are done before another thread has begun
   const auto coarse = AlignCoarse(search.sample, search.model, options, {from, 0, gate_mm});
   if (!coarse.ok()) return std::nullopt;
   const auto compare = [&](const Eigen::Isometry3d& pose) {
