@@ -11,6 +11,9 @@ namespace {
 
 using Arrays = SurfaceGridArrays;
 
+constexpr float kLeastVoxel_mm = 1e-3F, kMostVoxel_mm = 1e6F;
+constexpr std::uint32_t kMostBricks = 1U << 24;  // along an axis: voxels are then exact in single precision
+
 Status CheckTriangle(std::uint32_t triangle, std::size_t triangles) {
   if (triangle < triangles) return {};
   return Fail(ErrorCode::kInvalidArgument, "the model's grid names triangle {} of {}", triangle, triangles);
@@ -27,13 +30,17 @@ Status CheckVoxel(const Arrays& arrays, std::uint32_t word, std::size_t triangle
 }  // namespace
 
 Status Check(const SurfaceGridArrays& arrays, std::size_t triangles) {
-  const double cells = static_cast<double>(arrays.bricks[0]) * arrays.bricks[1] * arrays.bricks[2];
-  const bool sized = arrays.low.allFinite() && arrays.voxel_mm > 0 && std::isfinite(arrays.voxel_mm) &&
-                     arrays.band_mm >= 0 && cells > 0 && cells == static_cast<double>(arrays.tops.size()) &&
-                     arrays.voxels.size() % Arrays::kVoxelsOfBrick == 0;
+  const auto& bricks = arrays.bricks;
+  const double cells = static_cast<double>(bricks[0]) * bricks[1] * bricks[2];
+  const bool sized =
+      arrays.low.allFinite() && arrays.voxel_mm >= kLeastVoxel_mm && arrays.voxel_mm <= kMostVoxel_mm &&
+      arrays.band_mm >= 0 && std::isfinite(arrays.band_mm) &&
+      *std::max_element(bricks.begin(), bricks.end()) <= kMostBricks && cells > 0 &&
+      cells == static_cast<double>(arrays.tops.size()) && arrays.voxels.size() % Arrays::kVoxelsOfBrick == 0;
   if (!sized) {
-    return Fail(ErrorCode::kInvalidArgument, "the model's grid of {} x {} x {} bricks has {} of them",
-                arrays.bricks[0], arrays.bricks[1], arrays.bricks[2], arrays.tops.size());
+    return Fail(ErrorCode::kInvalidArgument,
+                "the model's grid of {} x {} x {} bricks with voxels of {} mm has {} of them", bricks[0],
+                bricks[1], bricks[2], arrays.voxel_mm, arrays.tops.size());
   }
   for (const std::uint32_t word : arrays.tops) {
     if ((word & Arrays::kDetailed) == 0) {

@@ -18,9 +18,9 @@ namespace forgescan {
 // The box from `low` is cut into bricks of 4 x 4 x 4 voxels, x fastest. A brick's word is kDetailed | number
 // of its 64 voxels in `voxels`, or the triangle nearest to its centre when no surface lies within band_mm of
 // it. A voxel's word is a value (28 bits) and a count (4 bits): 1 = the value is the only triangle that can
-// be nearest; 2 to kMostListed = so many triangles of `lists` from the value on, the nearest to the voxel's
-// centre first; 0 = no surface within band_mm, the value is the triangle nearest to the centre; kCrowded =
-// more triangles than that could be nearest, the value is the one nearest to the centre.
+// be nearest; 2 to kMostListed = so many triangles of `lists` from the value on (voxels share lists); 0 = no
+// surface within band_mm, the value is the triangle nearest to the centre; kCrowded = more triangles than
+// that could be nearest, the value is the one nearest to the centre.
 struct SurfaceGridArrays {
   static constexpr std::uint32_t kDetailed = 0x80000000U;
   static constexpr std::uint32_t kCountBits = 4, kCountMask = 15, kMostListed = 14, kCrowded = 15;
@@ -60,8 +60,8 @@ class SurfaceGrid {
   std::optional<TriangleIndex::Nearest> Find(const TriangleIndex& surface, const Eigen::Vector3f& point,
                                              float max_distance_mm) const;
 
-  // However far: exact within band_mm; beyond, the nearest place of the triangle stored there, whose distance is
-  // too long by less than the width of a brick. Nothing only for a point that is not finite.
+  // However far: exact within band_mm; beyond, the nearest place of the triangle stored there, whose distance
+  // is too long by less than the width of a brick. Nothing only for a point that is not finite.
   std::optional<TriangleIndex::Nearest> FindRoughly(const TriangleIndex& surface,
                                                     const Eigen::Vector3f& point) const;
 

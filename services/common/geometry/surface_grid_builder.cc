@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <map>
 #include <vector>
 
 #include "services/common/parallel_blocks.h"
@@ -56,9 +57,8 @@ std::uint32_t VoxelWord(const TriangleIndex& surface, const Eigen::Vector3f& cen
       surface.FindWithin(center, nearest_mm + 2 * half_mm + kRounding_mm, Arrays::kMostListed + 1);
   if (near.size() > Arrays::kMostListed) return Word(hint, Arrays::kCrowded);
   if (near.size() == 1) return Word(near[0].triangle, 1);
-  std::sort(near.begin(), near.end(), [](const auto& x, const auto& y) {
-    return x.distance_mm < y.distance_mm || (x.distance_mm == y.distance_mm && x.triangle < y.triangle);
-  });
+  // In one order, so that neighbouring voxels can share a list.
+  std::sort(near.begin(), near.end(), [](const auto& x, const auto& y) { return x.triangle < y.triangle; });
   const std::uint32_t word = Word(lists.size(), near.size());
   for (const auto& entry : near) lists.push_back(entry.triangle);
   return word;
@@ -86,20 +86,34 @@ void AddBrick(const TriangleIndex& surface, const Layout& layout, std::size_t br
   }
 }
 
-// Appends the block's words with its indices counted from the beginning of `all`.
-void Append(const Words& block, Words& all) {
-  const auto brick0 = static_cast<std::uint32_t>(all.voxels.size() / Arrays::kVoxelsOfBrick);
-  const std::size_t list0 = all.lists.size();
-  for (const std::uint32_t top : block.tops) {
-    all.tops.push_back((top & Arrays::kDetailed) != 0 ? top + brick0 : top);
+// Joins blocks to one grid, in which equal lists are stored once.
+class Joiner {
+ public:
+  void Append(const Words& block) {
+    const auto brick0 = static_cast<std::uint32_t>(all_.voxels.size() / Arrays::kVoxelsOfBrick);
+    for (const std::uint32_t top : block.tops) {
+      all_.tops.push_back((top & Arrays::kDetailed) != 0 ? top + brick0 : top);
+    }
+    for (const std::uint32_t word : block.voxels) {
+      const std::uint32_t count = word & Arrays::kCountMask, value = word >> Arrays::kCountBits;
+      const bool listed = count >= 2 && count <= Arrays::kMostListed;
+      all_.voxels.push_back(listed ? Word(Place(block.lists, value, count), count) : word);
+    }
   }
-  for (const std::uint32_t word : block.voxels) {
-    const std::uint32_t count = word & Arrays::kCountMask;
-    const bool listed = count >= 2 && count <= Arrays::kMostListed;
-    all.voxels.push_back(listed ? Word((word >> Arrays::kCountBits) + list0, count) : word);
+  Words Take() { return std::move(all_); }
+
+ private:
+  std::size_t Place(const std::vector<std::uint32_t>& lists, std::size_t first, std::size_t count) {
+    const auto begin = lists.begin() + static_cast<std::ptrdiff_t>(first);
+    std::vector<std::uint32_t> list(begin, begin + static_cast<std::ptrdiff_t>(count));
+    const auto [known, added] = places_.try_emplace(std::move(list), all_.lists.size());
+    if (added) all_.lists.insert(all_.lists.end(), known->first.begin(), known->first.end());
+    return known->second;
   }
-  all.lists.insert(all.lists.end(), block.lists.begin(), block.lists.end());
-}
+
+  Words all_;
+  std::map<std::vector<std::uint32_t>, std::size_t> places_;
+};
 
 // Nothing if it would take more than kMaxWords.
 std::optional<Words> Fill(const TriangleIndex& surface, const Layout& layout) {
@@ -114,9 +128,9 @@ std::optional<Words> Fill(const TriangleIndex& surface, const Layout& layout) {
     words += blocks[block].voxels.size() + blocks[block].lists.size();
   });
   if (words > kMaxWords) return std::nullopt;
-  Words all;
-  for (const Words& block : blocks) Append(block, all);
-  return all;
+  Joiner joiner;
+  for (const Words& block : blocks) joiner.Append(block);
+  return joiner.Take();
 }
 
 std::optional<Layout> LayoutOf(const Eigen::Vector3f& low, const Eigen::Vector3f& high,
