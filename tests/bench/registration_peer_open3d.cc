@@ -30,7 +30,7 @@ void BM_Open3d(benchmark::State& state) {
     for (const double width_mm : {60.0, 10.0, 2.0}) {
       const o3d::TransformationEstimationPointToPlane estimation(std::make_shared<o3d::TukeyLoss>(width_mm));
       const auto result = o3d::RegistrationICP(source, target, width_mm, pose, estimation,
-                                               o3d::ICPConvergenceCriteria(1e-8, 1e-8, 100));
+                                               o3d::ICPConvergenceCriteria(1e-8, 1e-8, 30));
       pose = result.transformation_;
     }
     Eigen::Isometry3d model_from_scan = Eigen::Isometry3d::Identity();

@@ -34,7 +34,7 @@ void BM_Pcl(benchmark::State& state) {
     icp.setInputTarget(target);
     icp.addCorrespondenceRejector(trimmed);
     icp.setMaxCorrespondenceDistance(61);  // as ours: how far the start can have the part off
-    icp.setMaximumIterations(300);
+    icp.setMaximumIterations(100);
     icp.setTransformationEpsilon(1e-10);
     icp.setTransformationRotationEpsilon(1 - 1e-10);
     icp.setEuclideanFitnessEpsilon(1e-10);
