@@ -18,22 +18,20 @@ std::vector<std::uint32_t> FindPartPoints(const PointCloud& scan, const Registra
   const bool has_normals = scan.normals.size() == scan.size();
   const auto min_cosine = static_cast<float>(std::cos(options.normal_limit_rad));
   std::vector<std::vector<std::uint32_t>> kept(BlockCount(scan.size(), kBlock));
-  ForEachBlock(scan.size(), kBlock, options.threads,
-               [&](std::size_t block, std::size_t begin, std::size_t end) {
-                 std::uint32_t hint = TriangleIndex::kNoTriangle;
-                 for (std::size_t i = begin; i < end; ++i) {
-                   const auto hit = model.surface().Find(motion * scan.points[i],
-                                                         static_cast<float>(options.max_distance_mm), hint);
-                   if (!hit) continue;
-                   hint = hit->triangle;
-                   const Eigen::Vector3f& normal = model.surface().Normal(hit->triangle);
-                   if (has_normals) {
-                     const Eigen::Vector3f measured = motion.linear() * scan.normals[i];
-                     if (!(measured.dot(normal) >= min_cosine * measured.norm())) continue;
-                   }
-                   kept[block].push_back(static_cast<std::uint32_t>(i));
-                 }
-               });
+  ForEachBlock(
+      scan.size(), kBlock, options.threads, [&](std::size_t block, std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+          const auto hit =
+              model.FindSurface(motion * scan.points[i], static_cast<float>(options.max_distance_mm));
+          if (!hit) continue;
+          const Eigen::Vector3f& normal = model.surface().Normal(hit->triangle);
+          if (has_normals) {
+            const Eigen::Vector3f measured = motion.linear() * scan.normals[i];
+            if (!(measured.dot(normal) >= min_cosine * measured.norm())) continue;
+          }
+          kept[block].push_back(static_cast<std::uint32_t>(i));
+        }
+      });
   std::vector<std::uint32_t> indices;
   for (const auto& part : kept) indices.insert(indices.end(), part.begin(), part.end());
   return indices;

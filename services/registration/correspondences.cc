@@ -31,53 +31,20 @@ float Residual(const Pair& pair) { return (pair.point - pair.foot).dot(pair.norm
 
 }  // namespace
 
-ScanSample CropToModel(const PointCloud& scan, const RegistrationModel& model, const Eigen::Isometry3d& start,
-                       double margin_mm) {
-  const Eigen::Isometry3f motion = start.cast<float>();
-  const Eigen::Vector3f low = (model.box_low().array() - margin_mm).cast<float>();
-  const Eigen::Vector3f high = (model.box_high().array() + margin_mm).cast<float>();
-  ScanSample sample;
-  for (std::size_t i = 0; i < scan.size(); ++i) {
-    const Eigen::Vector3f p = motion * scan.points[i];
-    // A coordinate that is NaN fails both comparisons.
-    if (!((p.array() >= low.array()).all() && (p.array() <= high.array()).all())) continue;
-    if (!scan.normals.empty()) {
-      const float length = scan.normals[i].norm();
-      if (!(length > 0)) continue;
-      sample.normals.emplace_back(scan.normals[i] / length);
-    }
-    sample.points.push_back(scan.points[i]);
-  }
-  return sample;
-}
-
-ScanSample Thin(const ScanSample& sample, std::size_t max_points) {
-  const std::size_t step = std::max<std::size_t>(1, (sample.size() + max_points - 1) / max_points);
-  ScanSample thin;
-  for (std::size_t i = 0; i < sample.size(); i += step) {
-    thin.points.push_back(sample.points[i]);
-    if (!sample.normals.empty()) thin.normals.push_back(sample.normals[i]);
-  }
-  return thin;
-}
-
-std::vector<Pair> PairWithSamples(const ScanSample& sample, const RegistrationModel& model,
-                                  const Eigen::Isometry3d& model_from_scan, const IcpOptions& options) {
+std::vector<Pair> PairRoughly(const ScanSample& sample, const RegistrationModel& model,
+                              const Eigen::Isometry3d& model_from_scan, const IcpOptions& options) {
   std::vector<Pair> pairs(sample.size());
   const Eigen::Matrix3f rotation = model_from_scan.linear().cast<float>();
   const auto min_cosine = static_cast<float>(std::cos(options.normal_limit_rad));
   ForEachBlock(sample.size(), kBlock, options.threads, [&](std::size_t, std::size_t begin, std::size_t end) {
-    std::vector<Eigen::Vector3f> moved;
     for (std::size_t i = begin; i < end; ++i) {
-      moved.emplace_back((model_from_scan * sample.points[i].cast<double>()).cast<float>());
-    }
-    const std::vector<NearestSample> nearest = model.FindSamples(moved);
-    for (std::size_t i = begin; i < end; ++i) {
-      const NearestSample& hit = nearest[i - begin];
-      const Eigen::Vector3f& normal = model.SampleNormal(hit.sample);
+      const Eigen::Vector3f p = (model_from_scan * sample.points[i].cast<double>()).cast<float>();
+      pairs[i] = {p, p, Eigen::Vector3f::Zero(), 0.0F, 0.0F};
+      const auto hit = model.FindSurfaceRoughly(p);
+      if (!hit) continue;
+      const Eigen::Vector3f& normal = model.surface().Normal(hit->triangle);
       const bool agree = NormalsAgree(sample, i, rotation, normal, min_cosine);
-      pairs[i] = {moved[i - begin], model.SamplePoint(hit.sample), normal, hit.distance_mm,
-                  agree ? 1.0F : 0.0F};
+      pairs[i] = {p, hit->foot, normal, hit->distance_mm, agree ? 1.0F : 0.0F};
     }
   });
   return pairs;
@@ -91,19 +58,32 @@ std::vector<Pair> PairWithSurface(const ScanSample& sample, const RegistrationMo
   const auto min_cosine = static_cast<float>(std::cos(options.normal_limit_rad));
   const auto reach = static_cast<float>(reach_mm);
   ForEachBlock(sample.size(), kBlock, options.threads, [&](std::size_t, std::size_t begin, std::size_t end) {
-    std::uint32_t hint = TriangleIndex::kNoTriangle;
     for (std::size_t i = begin; i < end; ++i) {
       const Eigen::Vector3f p = (model_from_scan * sample.points[i].cast<double>()).cast<float>();
       pairs[i] = {p, p, Eigen::Vector3f::Zero(), reach, 0.0F};
-      const auto hit = model.surface().Find(p, reach, hint);
+      const auto hit = model.FindSurface(p, reach);
       if (!hit) continue;
-      hint = hit->triangle;
       const Eigen::Vector3f& normal = model.surface().Normal(hit->triangle);
       const bool agree = NormalsAgree(sample, i, rotation, normal, min_cosine);
       pairs[i] = {p, hit->foot, normal, hit->distance_mm, agree && !hit->on_rim ? 1.0F : 0.0F};
     }
   });
   return pairs;
+}
+
+std::vector<float> CappedDistances(const ScanSample& sample, const RegistrationModel& model,
+                                   const Eigen::Isometry3d& model_from_scan, double cap_mm,
+                                   unsigned threads) {
+  std::vector<float> distances(sample.size());
+  const auto cap = static_cast<float>(cap_mm);
+  ForEachBlock(sample.size(), kBlock, threads, [&](std::size_t, std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const auto hit =
+          model.FindSurface((model_from_scan * sample.points[i].cast<double>()).cast<float>(), cap);
+      distances[i] = hit ? hit->distance_mm : cap;
+    }
+  });
+  return distances;
 }
 
 double AdaptiveThreshold(const std::vector<Pair>& pairs, double gate_mm, double floor_mm, double sigmas) {
@@ -121,17 +101,12 @@ double AdaptiveThreshold(const std::vector<Pair>& pairs, double gate_mm, double 
   return std::max(floor_mm, std::min(gate_mm, mean + sigmas * sigma));
 }
 
-void KeepNearest(std::vector<Pair>& pairs, double threshold_mm, double keep_share) {
-  std::vector<float> distances;
-  for (const Pair& pair : pairs) {
-    if (pair.weight > 0 && pair.distance_mm <= threshold_mm) distances.push_back(pair.distance_mm);
-  }
-  if (distances.empty()) return;
-  const double last = keep_share * static_cast<double>(distances.size() - 1);
-  const auto limit = distances.begin() + static_cast<std::ptrdiff_t>(last);
-  std::nth_element(distances.begin(), limit, distances.end());
+void WeighByDistance(std::vector<Pair>& pairs, double threshold_mm) {
+  const auto scale = static_cast<float>(1 / threshold_mm);
   for (Pair& pair : pairs) {
-    if (pair.distance_mm > std::min(static_cast<double>(*limit), threshold_mm)) pair.weight = 0;
+    const float ratio = pair.distance_mm * scale;
+    const float inside = std::max(0.0F, 1 - ratio * ratio);
+    pair.weight = pair.weight > 0 ? inside * inside : 0.0F;
   }
 }
 

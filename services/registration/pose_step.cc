@@ -3,10 +3,14 @@
 #include <Eigen/Eigenvalues>
 #include <cmath>
 
+#include "services/common/parallel_blocks.h"
+
 namespace forgescan {
 namespace {
 
 constexpr double kUnknowns = 6;
+constexpr std::size_t kBlock = 1024;    // pairs summed in one go
+constexpr double kAlongAnAxis = 0.995;  // cosine above which a direction is called by the axis' name
 
 struct NormalEquations {
   Matrix6 information = Matrix6::Zero();
@@ -16,21 +20,34 @@ struct NormalEquations {
   std::size_t pairs = 0;
 };
 
-NormalEquations Accumulate(const std::vector<Pair>& pairs, const StepFrame& frame) {
+void Add(const Pair& pair, const StepFrame& frame, NormalEquations& sum) {
+  const Eigen::Vector3d normal = pair.normal.cast<double>();
+  const Eigen::Vector3d arm = pair.point.cast<double>() - frame.center;
+  Vector6 row;
+  row << arm.cross(normal).cwiseQuotient(frame.reach_mm), normal;
+  const double weight = pair.weight;
+  const double residual_mm = (pair.point - pair.foot).cast<double>().dot(normal);
+  sum.information.noalias() += (weight * row) * row.transpose();
+  sum.gradient += weight * residual_mm * row;
+  sum.weight += weight;
+  sum.squares += weight * residual_mm * residual_mm;
+  ++sum.pairs;
+}
+
+NormalEquations Accumulate(const std::vector<Pair>& pairs, const StepFrame& frame, unsigned threads) {
+  std::vector<NormalEquations> blocks(BlockCount(pairs.size(), kBlock));
+  ForEachBlock(pairs.size(), kBlock, threads, [&](std::size_t block, std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      if (pairs[i].weight > 0) Add(pairs[i], frame, blocks[block]);
+    }
+  });
   NormalEquations sum;
-  for (const Pair& pair : pairs) {
-    if (!(pair.weight > 0)) continue;
-    const Eigen::Vector3d normal = pair.normal.cast<double>();
-    const Eigen::Vector3d arm = pair.point.cast<double>() - frame.center;
-    Vector6 row;
-    row << arm.cross(normal).cwiseQuotient(frame.reach_mm), normal;
-    const double weight = pair.weight;
-    const double residual_mm = (pair.point - pair.foot).cast<double>().dot(normal);
-    sum.information.noalias() += weight * row * row.transpose();
-    sum.gradient += weight * residual_mm * row;
-    sum.weight += weight;
-    sum.squares += weight * residual_mm * residual_mm;
-    ++sum.pairs;
+  for (const NormalEquations& block : blocks) {
+    sum.information += block.information;
+    sum.gradient += block.gradient;
+    sum.weight += block.weight;
+    sum.squares += block.squares;
+    sum.pairs += block.pairs;
   }
   return sum;
 }
@@ -44,19 +61,34 @@ Eigen::Isometry3d ExactMotion(const Vector6& step, const StepFrame& frame) {
   return motion;
 }
 
+std::string NameOfDirection(const Eigen::Vector3d& direction) {
+  for (int axis = 0; axis < 3; ++axis) {
+    if (std::abs(direction[axis]) >= kAlongAnAxis) return std::string(1, static_cast<char>('x' + axis));
+  }
+  return fmt::format("({:.2f}, {:.2f}, {:.2f})", direction.x(), direction.y(), direction.z());
+}
+
 }  // namespace
 
+std::string NameOfMotion(const Vector6& motion, const StepFrame& frame) {
+  if (motion.tail<3>().norm() >= motion.head<3>().norm()) {
+    return "translation along " + NameOfDirection(motion.tail<3>().normalized());
+  }
+  return "rotation about " + NameOfDirection(motion.head<3>().cwiseQuotient(frame.reach_mm).normalized());
+}
+
 Result<PoseStep> SolveStep(const std::vector<Pair>& pairs, const StepFrame& frame, const StepGuard& guard) {
-  const NormalEquations sum = Accumulate(pairs, frame);
+  const NormalEquations sum = Accumulate(pairs, frame, guard.threads);
   if (static_cast<double>(sum.pairs) < kUnknowns) {
     return Fail(ErrorCode::kDegenerate, "{} point pairs are left, a pose needs at least 6", sum.pairs);
   }
   const Eigen::SelfAdjointEigenSolver<Matrix6> eigen(sum.information / sum.weight);
   const double weakest = eigen.eigenvalues()[0];
   if (!(weakest >= guard.min_eigenvalue)) {
-    return Fail(ErrorCode::kDegenerate,
-                "the points do not fix the pose: weakest eigenvalue {:.2g}, at least {:.2g} is needed",
-                weakest, guard.min_eigenvalue);
+    return Fail(
+        ErrorCode::kDegenerate,
+        "the points do not fix the pose: {} is held with an eigenvalue of {:.2g}, at least {:.2g} is needed",
+        NameOfMotion(eigen.eigenvectors().col(0), frame), weakest, guard.min_eigenvalue);
   }
   const Matrix6 inverse = eigen.eigenvectors() *
                           (eigen.eigenvalues().array() + guard.damping).inverse().matrix().asDiagonal() *
@@ -67,7 +99,9 @@ Result<PoseStep> SolveStep(const std::vector<Pair>& pairs, const StepFrame& fram
   result.rotation_mm = step.head<3>().norm();
   result.translation_mm = step.tail<3>().norm();
   result.rms_mm = std::sqrt(sum.squares / sum.weight);
-  result.weakest_eigenvalue = weakest;
+  for (int i = 0; i < 6; ++i) {
+    result.motions[static_cast<std::size_t>(i)] = {eigen.eigenvectors().col(i), eigen.eigenvalues()[i]};
+  }
   Vector6 units;
   units << frame.reach_mm.cwiseInverse(), Eigen::Vector3d::Ones();
   const double freedom = std::max(sum.weight - kUnknowns, 1.0);

@@ -3,6 +3,8 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <array>
+#include <string>
 #include <vector>
 
 #include "services/common/result.h"
@@ -31,8 +33,15 @@ struct StepFrame {
 
 struct StepGuard {
   double min_eigenvalue;  // of the weighted mean of J^T J; below, the points do not fix the pose
-  double damping =
-      0;  // added to that mean's diagonal: a direction hardly seen stays where it is, others lose little
+  // Added to that mean's diagonal: a direction hardly seen stays where it is, others lose little.
+  double damping = 0;
+  unsigned threads = 1;  // 0: as many as the host has
+};
+
+// A motion the points hold, or hardly hold.
+struct HeldMotion {
+  Vector6 motion;     // unit; rotation about the centre * reach_mm, then translation: mm
+  double eigenvalue;  // of the weighted mean of J^T J
 };
 
 struct PoseStep {
@@ -40,15 +49,18 @@ struct PoseStep {
   double rotation_mm;                   // angles * reach_mm: the most the rotation moves a point
   double translation_mm;                // of the centre
   double rms_mm;                        // weighted, point to plane, before the step
-  double
-      weakest_eigenvalue;  // of the weighted mean of J^T J: 0 = a motion the points do not see; at most 1/3
+  // Weakest first. An eigenvalue of 0 is a motion the points do not see; the weakest is at most 1/3.
+  std::array<HeldMotion, 6> motions;
   Matrix6 covariance;  // of (rotation about center in rad, translation of center in mm), from the residuals
                        // as if independent
 };
 
-// Source: Eq. (5), (8), with the exact rotation in place of the linearised one. Sums run in the order of the
-// pairs. Errors: kDegenerate if fewer than 6 pairs have weight, or the weakest eigenvalue is below
-// min_eigenvalue.
+// "translation along x", "rotation about (0.00, 0.71, 0.71)": what a motion mostly is, in the model's axes.
+std::string NameOfMotion(const Vector6& motion, const StepFrame& frame);
+
+// Source: Eq. (5), (8), with the exact rotation in place of the linearised one. Sums run over blocks of fixed
+// size in the order of the pairs: equal bytes for any number of threads. Errors: kDegenerate if fewer than 6
+// pairs have weight, or the weakest eigenvalue is below min_eigenvalue, naming the motion.
 Result<PoseStep> SolveStep(const std::vector<Pair>& pairs, const StepFrame& frame, const StepGuard& guard);
 
 }  // namespace forgescan

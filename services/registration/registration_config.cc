@@ -29,11 +29,12 @@ Result<RegistrationConfig> RegistrationConfig::Load(ConfigTable table) {
   table.Optional("start_translation_mm", icp.start_translation_mm, 0.1, 500.0);
   table.Optional("start_rotation_rad", icp.start_rotation_rad, 0.001, 0.5);
   table.Optional("threshold_sigmas", icp.threshold_sigmas, 0.1, 10.0);
-  table.Optional("keep_share", icp.keep_share, 0.1, 1.0);
   table.Optional("threshold_floor_mm", icp.threshold_floor_mm, 0.01, 50.0);
   table.Optional("max_iterations", icp.max_iterations, 1, 1000);
   table.Optional("stop_mm", icp.stop_mm, 1e-6, 1.0);
   table.Optional("min_inlier_share", icp.min_inlier_share, 0.01, 1.0);
+  table.Optional("rival_ratio", icp.rival_ratio, 0.0, 100.0);
+  table.Optional("turned_ratio", icp.turned_ratio, 0.0, 100.0);
   table.Optional("max_distance_mm", config.classify.max_distance_mm, 0.1, 50.0);
   table.Optional("cloud_timeout_s", config.cloud_timeout_s, 0.1, 600.0);
   table.Optional("threads", threads, 0, 64);

@@ -1,30 +1,16 @@
 #include "services/registration/registration_model.h"
 
 #include <Eigen/Geometry>
-#include <cmath>
-#include <flann/flann.hpp>
 
 namespace forgescan {
 
-struct RegistrationModel::Tree {
-  explicit Tree(std::vector<Eigen::Vector3f>& points)
-      : index(flann::Matrix<float>(points.front().data(), points.size(), 3),
-              flann::KDTreeSingleIndexParams(12)) {
-    index.buildIndex();
-  }
-  flann::KDTreeSingleIndex<flann::L2_Simple<float>> index;
-};
-
-RegistrationModel::RegistrationModel(RegistrationModel&&) noexcept = default;
-RegistrationModel& RegistrationModel::operator=(RegistrationModel&&) noexcept = default;
-RegistrationModel::~RegistrationModel() = default;
-
 RegistrationModel::RegistrationModel(TriangleIndex surface, const ModelBundle& bundle)
     : surface_(std::move(surface)),
+      grid_(bundle.grid),
       sample_points_(bundle.sample_points),
       sample_normals_(bundle.sample_normals),
-      tree_(std::make_unique<Tree>(sample_points_)),
-      spacing_mm_(bundle.spacing_mm) {
+      spacing_mm_(bundle.spacing_mm),
+      chord_error_mm_(bundle.chord_error_mm) {
   Eigen::AlignedBox3d box;
   for (const TriangleCorners& t : bundle.triangles) {
     for (const std::uint32_t v : t) box.extend(bundle.vertices[v].cast<double>());
@@ -37,23 +23,6 @@ Result<RegistrationModel> RegistrationModel::Build(const ModelBundle& bundle) {
   RETURN_IF_ERROR(Check(bundle));
   ASSIGN_OR_RETURN(TriangleIndex surface, TriangleIndex::Build(bundle.vertices, bundle.triangles));
   return RegistrationModel(std::move(surface), bundle);
-}
-
-std::vector<NearestSample> RegistrationModel::FindSamples(std::span<const Eigen::Vector3f> queries) const {
-  std::vector<NearestSample> nearest(queries.size());
-  if (queries.empty()) return nearest;
-  std::vector<std::size_t> samples(queries.size());
-  std::vector<float> squared(queries.size());
-  // FLANN's matrices are not const-correct; a search does not write to its queries.
-  flann::Matrix<float> query_matrix(const_cast<float*>(queries.front().data()), queries.size(), 3);
-  flann::Matrix<std::size_t> sample_matrix(samples.data(), samples.size(), 1);
-  flann::Matrix<float> squared_matrix(squared.data(), squared.size(), 1);
-  tree_->index.knnSearch(query_matrix, sample_matrix, squared_matrix, 1,
-                         flann::SearchParams(flann::FLANN_CHECKS_UNLIMITED, 0.0F));
-  for (std::size_t i = 0; i < queries.size(); ++i) {
-    nearest[i] = {static_cast<std::uint32_t>(samples[i]), std::sqrt(squared[i])};
-  }
-  return nearest;
 }
 
 }  // namespace forgescan

@@ -60,6 +60,7 @@ std::string Counters(const nlohmann::json& entry) {
 std::pair<std::string, std::string> Split(std::string name) {
   const std::string clock = "/real_time";
   if (name.ends_with(clock)) name.resize(name.size() - clock.size());
+  for (const char* setting : {"/iterations:", "/repeats:"}) name.resize(std::min(name.size(), name.find(setting)));
   const auto slash = name.find('/');
   if (slash == std::string::npos) throw std::runtime_error("benchmark " + name + " is not named STEP/WHO");
   return {name.substr(0, slash), name.substr(slash + 1)};

@@ -1,65 +1,98 @@
-// Registration and classification of 500,000 points, 22 % of them foreign, start off by 10 mm and 3 degrees.
-#include <benchmark/benchmark.h>
-
-#include <stdexcept>
-
-#include "services/common/model/model_import.h"
+// Registration and what belongs to it, and the paper's algorithm on the same data. Peers:
+// registration_peer_*.cc.
+#include "services/common/parallel_blocks.h"
 #include "services/registration/classify.h"
-#include "services/registration/icp.h"
-#include "tests/common/shapes/test_axle.h"
+#include "services/registration/paper_icp.h"
+#include "services/registration/pose_search.h"
+#include "tests/bench/registration_case.h"
 
-namespace forgescan {
+namespace forgescan::bench {
 namespace {
 
-struct Case {
-  ModelBundle bundle = Must(testing::MakeAxle({}, 2));
-  RegistrationModel model = Must(RegistrationModel::Build(bundle));
-  Eigen::Isometry3d scan_from_model = testing::RandomMotion(Eigen::Vector3d::Zero(), 0.0524, 10, 1);
-  PointCloud scan = testing::Moved(testing::ScanOf(bundle, {500'000, 0.22, 0.03, 1}), scan_from_model);
-
-  template <typename T>
-  static T Must(Result<T> result) {
-    if (!result.ok()) throw std::runtime_error(result.error().message);
-    return std::move(result).value();
+void Register(benchmark::State& state, unsigned threads, double rival_ratio) {
+  const RegistrationCase& c = TheRegistration();
+  IcpOptions options;
+  options.threads = threads;
+  options.rival_ratio = rival_ratio;
+  for (auto _ : state) {
+    const auto result = RegisterScan(c.scan, c.model, Eigen::Isometry3d::Identity(), options);
+    if (!result.ok()) return state.SkipWithError(result.error().message.c_str());
+    state.counters["iterations"] = result->iterations;
+    Judge(state, result->model_from_scan, kOursWithinMm);
   }
-};
+}
 
-const Case& TheCase() {
-  static const Case only;
-  return only;
+void BM_Ours(benchmark::State& state) { Register(state, 1, IcpOptions().rival_ratio); }
+void BM_OursTwoThreads(benchmark::State& state) { Register(state, 2, IcpOptions().rival_ratio); }
+void BM_OursWithoutRivalCheck(benchmark::State& state) { Register(state, 1, 0); }
+
+void BM_Paper(benchmark::State& state) {
+  const RegistrationCase& c = TheRegistration();
+  const SampleTree tree(c.model.sample_points());
+  const auto search = [&tree](std::span<const Eigen::Vector3f> queries) { return tree.Find(queries); };
+  for (auto _ : state) {
+    const auto result = RegisterAsInPaper(c.scan, c.model, search, Eigen::Isometry3d::Identity(), {});
+    if (!result.ok()) return state.SkipWithError(result.error().message.c_str());
+    if (!result->at_rest) return state.SkipWithError("not at rest after 300 iterations");
+    state.counters["iterations"] = result->iterations;
+    Judge(state, result->model_from_scan, kPeerWithinMm);
+  }
 }
 
 void BM_BuildModel(benchmark::State& state) {
-  for (auto _ : state) benchmark::DoNotOptimize(RegistrationModel::Build(TheCase().bundle));
+  for (auto _ : state) benchmark::DoNotOptimize(RegistrationModel::Build(TheRegistration().bundle));
 }
 
-void BM_Register(benchmark::State& state) {
-  const Case& c = TheCase();
-  IcpOptions options;
-  options.threads = static_cast<unsigned>(state.range(0));
-  for (auto _ : state) {
-    const auto result = RegisterScan(c.scan, c.model, Eigen::Isometry3d::Identity(), options);
-    if (!result.ok()) state.SkipWithError(result.error().message.c_str());
-    const Eigen::Vector3d end(944, 90, 60);
-    state.counters["end_error_um"] = 1000 * (result->model_from_scan * c.scan_from_model * end - end).norm();
-    state.counters["iterations"] = result->iterations;
-  }
-}
-
-void BM_Classify(benchmark::State& state) {
-  const Case& c = TheCase();
+void Classify(benchmark::State& state, unsigned threads) {
+  const RegistrationCase& c = TheRegistration();
   ClassifyOptions options;
-  options.threads = static_cast<unsigned>(state.range(0));
+  options.threads = threads;
   for (auto _ : state) {
     benchmark::DoNotOptimize(FindPartPoints(c.scan, c.model, c.scan_from_model.inverse(), options));
   }
 }
 
+void BM_Classify(benchmark::State& state) { Classify(state, 1); }
+void BM_ClassifyTwoThreads(benchmark::State& state) { Classify(state, 2); }
+
+void BM_Search(benchmark::State& state) {
+  const RegistrationCase& c = TheRegistration();
+  const Eigen::Isometry3d turned(Eigen::AngleAxisd(2.5, Eigen::Vector3d(1, 2, -1).normalized()));
+  const PointCloud scan = testing::Moved(c.scan, turned);
+  IcpOptions options;
+  options.threads = 1;
+  for (auto _ : state) {
+    const auto result = SearchPose(scan, c.model, options);
+    if (!result.ok()) return state.SkipWithError(result.error().message.c_str());
+    Judge(state, result->model_from_scan * turned, kOursWithinMm);
+  }
+}
+
+BENCHMARK(BM_Ours)->Name("registration/ours")->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK(BM_OursTwoThreads)
+    ->Name("registration/ours/threads:2")
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime();
+BENCHMARK(BM_OursWithoutRivalCheck)
+    ->Name("registration/ours_without_rival_check")
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime();
+// Minutes: once a repetition, and no more than three of them.
+BENCHMARK(BM_Paper)
+    ->Name("registration/paper")
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime()
+    ->Iterations(1)
+    ->Repetitions(3);
 BENCHMARK(BM_BuildModel)->Name("model_preparation/ours")->Unit(benchmark::kMillisecond);
-BENCHMARK(BM_Register)->Name("registration/ours")->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->UseRealTime();
-BENCHMARK(BM_Classify)->Name("classification/ours")->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK(BM_Search)->Name("pose_search/ours")->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK(BM_Classify)->Name("classification/ours")->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK(BM_ClassifyTwoThreads)
+    ->Name("classification/ours/threads:2")
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime();
 
 }  // namespace
-}  // namespace forgescan
+}  // namespace forgescan::bench
 
 BENCHMARK_MAIN();

@@ -27,6 +27,9 @@ Status Import(const Arguments& arguments) {
   std::printf("%zu faces, %zu triangles, %zu samples, resolution %.3f mm, checksum %08x\n",
               bundle.faces.size(), bundle.triangles.size(), bundle.sample_points.size(), bundle.resolution_mm,
               bundle.checksum);
+  const SurfaceGridArrays& grid = bundle.grid.arrays();
+  std::printf("grid of %.3g mm voxels, %.1f MB\n", static_cast<double>(grid.voxel_mm),
+              4e-6 * static_cast<double>(grid.tops.size() + grid.voxels.size() + grid.lists.size()));
   for (const ModelFace& face : bundle.faces) {
     std::printf("  %-24s %-9s %7u triangles", face.name.c_str(), FaceTypeName(face.type),
                 face.triangle_count);
@@ -52,8 +55,7 @@ void AddModelCommand(CLI::App& app, Status& outcome) {
                    "of the triangles of a STEP file")
       ->check(FiniteRange(1e-6, 1e3))
       ->capture_default_str();
-  import->callback([arguments, &outcome] { outcome = Import(*arguments);
-});
-}  // namespace forgescan
+  import->callback([arguments, &outcome] { outcome = Import(*arguments); });
+}
 
 }  // namespace forgescan

@@ -7,6 +7,7 @@
 #include "services/common/output_file.h"
 #include "services/registration/classify.h"
 #include "services/registration/icp.h"
+#include "services/registration/pose_search.h"
 #include "tools/forgescan/command.h"
 #include "tools/forgescan/output_files.h"
 #include "tools/forgescan/text_output.h"
@@ -16,6 +17,7 @@ namespace {
 
 struct Arguments {
   std::string scan, model, initial, out, json;
+  bool search = false;
   ModelImportOptions import;
   IcpOptions icp;
   ClassifyOptions classify;
@@ -30,6 +32,13 @@ nlohmann::json Matrix(const Eigen::Ref<const Eigen::MatrixXd>& m) {
   return rows;
 }
 
+nlohmann::json WeakDirections(const Registration& r) {
+  nlohmann::json list = nlohmann::json::array();
+  for (const auto& weak : r.weak_directions)
+    list.push_back({{"motion", weak.name}, {"eigenvalue", weak.eigenvalue}});
+  return list;
+}
+
 std::string Json(const Registration& r, const CloudFromFile& scan, std::size_t part_points) {
   const nlohmann::json json = {{"model_from_scan", Matrix(r.model_from_scan.matrix())},
                                {"iterations", r.iterations},
@@ -40,6 +49,9 @@ std::string Json(const Registration& r, const CloudFromFile& scan, std::size_t p
                                {"rms_mm", r.rms_mm},
                                {"capped_score_mm", r.capped_score_mm},
                                {"weakest_eigenvalue", r.weakest_eigenvalue},
+                               {"weak_directions", WeakDirections(r)},
+                               // JSON has no infinity: null says that there is no rival.
+                               {"rival_ratio", r.rival_ratio},
                                {"correction_mm", r.correction_mm},
                                {"correction_rad", r.correction_rad},
                                {"covariance_rad_mm", Matrix(r.covariance)},
@@ -65,7 +77,9 @@ Status Run(const Arguments& arguments) {
   if (!arguments.initial.empty()) {
     ASSIGN_OR_RETURN(start, ReadPose(arguments.initial));
   }
-  ASSIGN_OR_RETURN(const Registration result, RegisterScan(scan, model, start, arguments.icp));
+  ASSIGN_OR_RETURN(const Registration result, arguments.search
+                                                  ? SearchPose(scan, model, arguments.icp)
+                                                  : RegisterScan(scan, model, start, arguments.icp));
   const auto part = FindPartPoints(scan, model, result.model_from_scan, arguments.classify);
   if (!arguments.json.empty()) {
     RETURN_IF_ERROR(WriteOutputFile(outputs.Staged(arguments.json), Json(result, scan, part.size())));
@@ -82,8 +96,10 @@ void AddRegisterCommand(CLI::App& app, Status& outcome) {
       app.add_subcommand("register", "Find the pose of a part in a scan, by its design model");
   command->add_option("--scan", arguments->scan, "scan, PLY or PCD, mm")->required();
   command->add_option("--model", arguments->model, "design model: .step, .stl, .ply or .bundle")->required();
-  command->add_option("--initial", arguments->initial,
-                      "model_from_scan to start from, 4 x 4 (default: identity)");
+  CLI::Option* initial = command->add_option("--initial", arguments->initial,
+                                             "model_from_scan to start from, 4 x 4 (default: identity)");
+  command->add_flag("--search", arguments->search, "however the part lies: without a start")
+      ->excludes(initial);
   command->add_option("--out", arguments->out, "where to write model_from_scan, 4 x 4, row-major, mm")
       ->required();
   command->add_option("--json", arguments->json, "where to write pose, quality and covariance");
@@ -102,6 +118,10 @@ void AddRegisterCommand(CLI::App& app, Status& outcome) {
   command->add_option("--threshold-floor-mm", arguments->icp.threshold_floor_mm, "least distance threshold")
       ->capture_default_str();
   command->add_option("--min-inlier-share", arguments->icp.min_inlier_share, "of the points about the model")
+      ->capture_default_str();
+  command
+      ->add_option("--rival-ratio", arguments->icp.rival_ratio,
+                   "refuse when another pose scores below so many times this one; 0: do not look")
       ->capture_default_str();
   command->add_option("--threads", arguments->icp.threads, "0: all")->capture_default_str();
   command->callback([arguments, &outcome] {

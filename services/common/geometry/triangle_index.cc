@@ -161,17 +161,60 @@ void TriangleIndex::BuildNode(std::size_t begin, std::size_t end, std::vector<Ei
   BuildNode(middle, end, centroids);
 }
 
+void TriangleIndex::Visit(const Corners& c, std::uint32_t slot, const Eigen::Vector3f& point, Best& best) {
+  const Eigen::Vector3f foot = NearestOnTriangle(point, c.a, c.ab, c.ac);
+  const float squared = (point - foot).squaredNorm();
+  if (!(squared <= best.squared * (1 + kTie))) return;  // also when a sliver gave NaN
+  const float off_plane = std::abs(c.normal.dot(point - foot));
+  const bool tie = best.slot != kNoTriangle && squared > best.squared * (1 - kTie);
+  if (tie && off_plane <= best.off_plane) return;
+  best = {std::min(squared, best.squared), slot, foot, off_plane};
+}
+
 void TriangleIndex::VisitLeaf(const Node& leaf, const Eigen::Vector3f& point, Best& best) const {
   for (std::uint32_t slot = leaf.first; slot < leaf.first + leaf.count; ++slot) {
-    const Corners& c = corners_[slot];
-    const Eigen::Vector3f foot = NearestOnTriangle(point, c.a, c.ab, c.ac);
-    const float squared = (point - foot).squaredNorm();
-    if (!(squared <= best.squared * (1 + kTie))) continue;  // also when a sliver gave NaN
-    const float off_plane = std::abs(c.normal.dot(point - foot));
-    const bool tie = best.slot != kNoTriangle && squared > best.squared * (1 - kTie);
-    if (tie && off_plane <= best.off_plane) continue;
-    best = {std::min(squared, best.squared), slot, foot, off_plane};
+    Visit(corners_[slot], slot, point, best);
   }
+}
+
+std::optional<TriangleIndex::Nearest> TriangleIndex::NearestOf(const Best& best,
+                                                               const Eigen::Vector3f& point) const {
+  if (best.slot == kNoTriangle) return std::nullopt;
+  const Corners& hit = corners_[best.slot];
+  return Nearest{hit.triangle, (point - best.foot).norm(), best.foot + center_, IsOnRim(hit, best.foot)};
+}
+
+std::optional<TriangleIndex::Nearest> TriangleIndex::FindAmong(
+    const Eigen::Vector3f& point, float max_distance_mm, std::span<const std::uint32_t> triangles) const {
+  const Eigen::Vector3f p = point - center_;
+  if (!p.allFinite() || !(max_distance_mm >= 0)) return std::nullopt;
+  Best best{max_distance_mm * max_distance_mm};
+  for (const std::uint32_t triangle : triangles) {
+    const std::uint32_t slot = slot_of_[triangle];
+    Visit(corners_[slot], slot, p, best);
+  }
+  return NearestOf(best, p);
+}
+
+std::vector<TriangleIndex::Distance> TriangleIndex::FindWithin(const Eigen::Vector3f& point, float radius_mm,
+                                                               std::size_t most) const {
+  const Eigen::Vector3f p = point - center_;
+  std::vector<Distance> found;
+  if (!p.allFinite() || !(radius_mm >= 0)) return found;
+  std::vector<std::uint32_t> stack = {0};
+  while (!stack.empty() && found.size() < most) {
+    const std::uint32_t at = stack.back();
+    const Node& node = nodes_[at];
+    stack.pop_back();
+    if (SquaredDistanceToBox(p, node.low, node.high) > radius_mm * radius_mm) continue;
+    if (node.count == 0) stack.insert(stack.end(), {node.first, at + 1});
+    for (std::uint32_t slot = node.first; slot < node.first + node.count && found.size() < most; ++slot) {
+      const Corners& c = corners_[slot];
+      const float distance_mm = (p - NearestOnTriangle(p, c.a, c.ab, c.ac)).norm();
+      if (distance_mm <= radius_mm) found.push_back({c.triangle, distance_mm});
+    }
+  }
+  return found;
 }
 
 std::optional<TriangleIndex::Nearest> TriangleIndex::Find(const Eigen::Vector3f& point, float max_distance_mm,
@@ -206,9 +249,7 @@ std::optional<TriangleIndex::Nearest> TriangleIndex::Find(const Eigen::Vector3f&
     stack[depth++] = far;
     stack[depth++] = near;
   }
-  if (best.slot == kNoTriangle) return std::nullopt;
-  const Corners& hit = corners_[best.slot];
-  return Nearest{hit.triangle, (p - best.foot).norm(), best.foot + center_, IsOnRim(hit, best.foot)};
+  return NearestOf(best, p);
 }
 
 }  // namespace forgescan

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <limits>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "services/common/geometry/triangle_mesh.h"
@@ -44,6 +45,19 @@ class TriangleIndex {
   std::optional<Nearest> Find(const Eigen::Vector3f& point, float max_distance_mm,
                               std::uint32_t hint = kNoTriangle) const;
 
+  // The nearest of the named triangles, with the rules of Find for what is equally near. The numbers must be
+  // below size().
+  std::optional<Nearest> FindAmong(const Eigen::Vector3f& point, float max_distance_mm,
+                                   std::span<const std::uint32_t> triangles) const;
+
+  struct Distance {
+    std::uint32_t triangle;
+    float distance_mm;
+  };
+  // Triangles within radius_mm, in the order of the tree; no more than `most`. Nothing for a point that is
+  // not finite.
+  std::vector<Distance> FindWithin(const Eigen::Vector3f& point, float radius_mm, std::size_t most) const;
+
   // Unit normal, outward by the corner order; zero for a triangle without area.
   const Eigen::Vector3f& Normal(std::uint32_t triangle) const { return corners_[slot_of_[triangle]].normal; }
   std::size_t size() const { return corners_.size(); }
@@ -66,7 +80,9 @@ class TriangleIndex {
   void BuildNode(std::size_t begin, std::size_t end, std::vector<Eigen::Vector3f>& centroids);
   void MarkRims(const std::vector<Eigen::Vector3f>& vertices, const std::vector<TriangleCorners>& triangles);
   bool IsOnRim(const Corners& corners, const Eigen::Vector3f& foot) const;
+  static void Visit(const Corners& corners, std::uint32_t slot, const Eigen::Vector3f& point, Best& best);
   void VisitLeaf(const Node& leaf, const Eigen::Vector3f& point, Best& best) const;
+  std::optional<Nearest> NearestOf(const Best& best, const Eigen::Vector3f& point) const;
 
   Eigen::Vector3f center_ = Eigen::Vector3f::Zero();
   std::vector<Corners> corners_;        // in leaf order

@@ -86,6 +86,7 @@ Status Check(const ModelBundle& bundle) {
         "numbers > 0, >= 0 and >= 0",
         bundle.spacing_mm, bundle.resolution_mm, bundle.chord_error_mm);
   }
+  RETURN_IF_ERROR(Check(bundle.grid.arrays(), bundle.triangles.size()));
   return CheckFaces(bundle);
 }
 

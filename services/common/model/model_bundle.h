@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "services/common/geometry/surface_grid.h"
 #include "services/common/geometry/triangle_index.h"
 #include "services/common/result.h"
 
@@ -42,6 +43,7 @@ struct ModelBundle {
   double resolution_mm = 0;  // r of Eq. (10): mean distance of a sample to its nearest other sample
   double chord_error_mm =
       0;  // largest distance between triangles and CAD surface asked for; 0: the file was triangles
+  SurfaceGrid grid;  // of the triangles; in a bundle read from a file, its arrays are the mapped file
   std::uint32_t checksum = 0;  // CRC-32 of everything above as written to a bundle file
 };
 

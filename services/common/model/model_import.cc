@@ -12,8 +12,22 @@
 namespace forgescan {
 namespace {
 
+constexpr float kVoxelsOfSpacing = 2;  // width of a voxel in sample spacings
+constexpr float kGridMargin_mm = 64;   // beyond the part: a long part's end at the start of a registration
+
+Result<SurfaceGrid> GridOf(const ModelBundle& bundle) {
+  ASSIGN_OR_RETURN(const TriangleIndex surface, TriangleIndex::Build(bundle.vertices, bundle.triangles));
+  Eigen::AlignedBox3f box;
+  for (const TriangleCorners& t : bundle.triangles) {
+    for (const std::uint32_t vertex : t) box.extend(bundle.vertices[vertex]);
+  }
+  return SurfaceGrid::Build(surface, box.min(), box.max(),
+                            {kVoxelsOfSpacing * static_cast<float>(bundle.spacing_mm), kGridMargin_mm});
+}
+
 Result<ModelBundle> Finish(ModelBundle bundle, double spacing_mm) {
   ASSIGN_OR_RETURN(ModelBundle sampled, SampleSurface(std::move(bundle), spacing_mm));
+  ASSIGN_OR_RETURN(sampled.grid, GridOf(sampled));
   RETURN_IF_ERROR(Check(sampled));
   // Through the file format, so that an imported model and the same model read back are equal in every byte.
   return DecodeBundle(EncodeBundle(sampled));

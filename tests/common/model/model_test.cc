@@ -103,6 +103,32 @@ TEST(ModelTest, BundleComesBackEqualAndDamageIsSeen) {
   EXPECT_FALSE(DecodeBundle(bytes + "x").ok());
 }
 
+TEST(ModelTest, ABundleReadFromAFileUsesTheMappedGrid) {
+  const auto model = ModelFromMesh(BoxMesh(), 1);
+  ASSERT_TRUE(model.ok());
+  const auto path = std::filesystem::temp_directory_path() / fmt::format("forgescan_grid_{}.bundle", ::getpid());
+  ASSERT_TRUE(WriteBundle(*model, path).ok());
+  auto read = ReadBundle(path);
+  // Replaced as WriteBundle does it: what is mapped stays as it was.
+  ASSERT_TRUE(WriteBundle(*ModelFromMesh(BoxMesh(), 2), path).ok());
+  std::filesystem::remove(path);
+  ASSERT_TRUE(read.ok()) << read.error().message;
+  EXPECT_EQ(EncodeBundle(*read), EncodeBundle(*model));
+  const SurfaceGrid copy = read->grid;
+  read = Fail(ErrorCode::kNotFound, "gone");  // the copy keeps the file mapped
+  EXPECT_TRUE(Check(copy.arrays(), model->triangles.size()).ok());
+  EXPECT_EQ(ReadBundle(path).error().code, ErrorCode::kNotFound);
+}
+
+TEST(ModelTest, ABundleOfAnOlderVersionSaysWhatToDo) {
+  std::string bytes = EncodeBundle(*ModelFromMesh(BoxMesh(), 1));
+  bytes[8] = 1;  // the version follows the eight letters
+  const auto old = DecodeBundle(bytes);
+  ASSERT_FALSE(old.ok());
+  EXPECT_EQ(old.error().code, ErrorCode::kFormat);
+  EXPECT_NE(old.error().message.find("prepare the model anew"), std::string::npos) << old.error().message;
+}
+
 TEST(ModelTest, ReadsBothKindsOfStl) {
   for (const std::string& bytes : {BinaryStl(BoxMesh()), AsciiStl(BoxMesh())}) {
     const auto mesh = DecodeStl(bytes);

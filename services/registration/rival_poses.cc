@@ -1,0 +1,219 @@
+#include "services/registration/rival_poses.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "services/registration/correspondences.h"
+#include "services/registration/icp_stages.h"
+
+namespace forgescan {
+namespace {
+
+constexpr std::size_t kProfilePoints = 400, kAlignPoints = 2'000, kSymmetryPoints = 1'000;
+constexpr double kProfileStepMm = 1;   // a valley of the capped score is a few mm wide
+constexpr int kMostProfileSteps = 40;  // to each side
+constexpr double kRidge = 1.1;         // a valley lies behind a ridge this much higher than its bottom
+constexpr std::size_t kMostValleys = 3;
+constexpr int kRivalIterations = 20;
+constexpr double kHopeless = 4;        // a rough alignment with so many times the score is not refined
+constexpr double kSymmetryMm = 0.005;  // mean distance of a model from itself: rounding of its file
+constexpr double kStartFactor = 2;     // as in RegisterScan's check against the start
+constexpr double kSamePoseShare = 2;   // of the threshold's floor: nearer poses are the same valley
+
+ScanSample Thinned(const ScanSample& sample, std::size_t most) {
+  const std::size_t step = std::max<std::size_t>(1, (sample.size() + most - 1) / most);
+  ScanSample thin;
+  for (std::size_t i = 0; i < sample.size(); i += step) {
+    thin.points.push_back(sample.points[i]);
+    if (!sample.normals.empty()) thin.normals.push_back(sample.normals[i]);
+  }
+  return thin;
+}
+
+// Along (axis 0 to 2) or about (3 to 5) a model axis through the box's centre.
+Eigen::Isometry3d MotionOf(const RegistrationModel& model, int axis, double far_end_mm) {
+  if (axis < 3) return Eigen::Isometry3d(Eigen::Translation3d(far_end_mm * Eigen::Vector3d::Unit(axis)));
+  const double angle = far_end_mm / FrameOf(model).reach_mm[axis - 3];
+  const Eigen::Translation3d center(model.center());
+  return center * Eigen::AngleAxisd(angle, Eigen::Vector3d::Unit(axis - 3)) * center.inverse();
+}
+
+double MeanOf(const std::vector<float>& values) {
+  double sum = 0;
+  for (const float v : values) sum += v;
+  return sum / static_cast<double>(std::max<std::size_t>(values.size(), 1));
+}
+
+struct Valley {
+  Eigen::Isometry3d model_from_scan;
+  double score_mm;
+};
+
+struct Search {
+  const ScanSample& sample;  // kAlignPoints
+  const RegistrationModel& model;
+  const Eigen::Isometry3d& found;
+  const IcpOptions& options;
+};
+
+// Appends the valleys of the score along one axis to one side, behind a ridge.
+void AddValleys(const Search& search, const ScanSample& few, const std::vector<Eigen::Isometry3d>& poses,
+                std::vector<Valley>& valleys) {
+  const IcpOptions& o = search.options;
+  std::vector<double> scores;
+  for (const auto& pose : poses) {
+    scores.push_back(MeanOf(CappedDistances(few, search.model, pose, o.score_cap_mm, 1)));
+  }
+  double ridge_mm = 0;
+  for (std::size_t i = 0; i + 1 < scores.size(); ++i) {
+    const bool bottom = i > 0 && scores[i] <= scores[i - 1] && scores[i] < scores[i + 1];
+    if (bottom && scores[i] * kRidge < ridge_mm) {
+      valleys.push_back({poses[i], scores[i]});
+      ridge_mm = scores[i];
+    }
+    ridge_mm = std::max(ridge_mm, scores[i]);
+  }
+}
+
+// The lowest valleys along and about all axes.
+std::vector<Valley> FindValleys(const Search& search) {
+  const ScanSample few = Thinned(search.sample, kProfilePoints);
+  std::vector<Valley> valleys;
+  for (int axis = 0; axis < 6; ++axis) {
+    const double range_mm = kStartFactor * (axis < 3 ? search.options.start_translation_mm
+                                                     : search.options.start_rotation_rad *
+                                                           FrameOf(search.model).reach_mm[axis - 3]);
+    const int steps = std::clamp(static_cast<int>(range_mm / kProfileStepMm), 3, kMostProfileSteps);
+    for (const double side : {-1.0, 1.0}) {
+      std::vector<Eigen::Isometry3d> poses;
+      for (int i = 0; i <= steps; ++i) {
+        poses.push_back(MotionOf(search.model, axis, side * range_mm * i / steps) * search.found);
+      }
+      AddValleys(search, few, poses, valleys);
+    }
+  }
+  std::stable_sort(valleys.begin(), valleys.end(),
+                   [](const Valley& a, const Valley& b) { return a.score_mm < b.score_mm; });
+  if (valleys.size() > kMostValleys) valleys.erase(valleys.begin() + kMostValleys, valleys.end());
+  return valleys;
+}
+
+// A short alignment from there; nothing if it fails, is hopeless or ends in the valley of `found`.
+std::optional<RivalPose> Settle(const Search& search, const Eigen::Isometry3d& from, double gate_mm) {
+  IcpOptions options = search.options;
+  options.max_iterations = kRivalIterations;
+  options.min_eigenvalue = 0;
+  options.threads = 1;  // so few points are done before another thread has begun
+  const auto coarse = AlignCoarse(search.sample, search.model, options, {from, 0, gate_mm});
+  if (!coarse.ok()) return std::nullopt;
+  const auto compare = [&](const Eigen::Isometry3d& pose) {
+    return CompareScores(search.sample, search.model, search.found, pose, options);
+  };
+  const PoseScores rough = compare(coarse->model_from_scan);
+  if (rough.other_mm > kHopeless * rough.one_mm) return std::nullopt;
+  const auto fine = AlignFine(search.sample, search.model, options, options.stop_mm,
+                              BeginFine(search.model, options, *coarse));
+  if (!fine.ok()) return std::nullopt;
+  const Eigen::Isometry3d& pose = fine->align.model_from_scan;
+  const Eigen::Isometry3d motion = pose * search.found.inverse();
+  const double same_mm = kSamePoseShare * std::max(options.threshold_floor_mm, search.model.spacing_mm());
+  if (CornerMotionMm(motion, search.model) < same_mm) return std::nullopt;
+  const Eigen::AngleAxisd turn(motion.linear());
+  const Eigen::Vector3d shift = motion * search.model.center() - search.model.center();
+  return RivalPose{
+      pose, compare(pose), false,
+      fmt::format("({:.2f}, {:.2f}, {:.2f}) mm and {:.2f} degrees about ({:.2f}, {:.2f}, {:.2f})", shift.x(),
+                  shift.y(), shift.z(), turn.angle() * 180 / std::numbers::pi, turn.axis().x(),
+                  turn.axis().y(), turn.axis().z())};
+}
+
+bool StartAllows(const Search& search, const Eigen::Isometry3d& start, const Eigen::Isometry3d& pose) {
+  const Eigen::Isometry3d correction = pose * start.inverse();
+  const Eigen::Vector3d center = search.model.center();
+  return (correction * center - center).norm() <= kStartFactor * search.options.start_translation_mm &&
+         Eigen::AngleAxisd(correction.linear()).angle() <= kStartFactor * search.options.start_rotation_rad;
+}
+
+// Of two rivals, the one nearer to a refusal.
+bool IsStronger(const RivalPose& a, const RivalPose& b, const IcpOptions& options) {
+  const auto pressure = [&](const RivalPose& r) {
+    return r.scores.other_mm / (r.from_start ? options.rival_ratio : options.turned_ratio) / r.scores.one_mm;
+  };
+  return pressure(a) < pressure(b);
+}
+
+}  // namespace
+
+double CornerMotionMm(const Eigen::Isometry3d& motion, const RegistrationModel& model) {
+  double worst = 0;
+  for (int corner = 0; corner < 8; ++corner) {
+    const auto side = [corner](int axis) { return (corner >> axis & 1) != 0; };
+    Eigen::Vector3d p;
+    for (int axis = 0; axis < 3; ++axis) p[axis] = (side(axis) ? model.box_high() : model.box_low())[axis];
+    worst = std::max(worst, (motion * p - p).norm());
+  }
+  return worst;
+}
+
+Eigen::Isometry3d HalfTurn(const RegistrationModel& model, int axis) {
+  const Eigen::Translation3d center(model.center());
+  return center * Eigen::AngleAxisd(std::numbers::pi, Eigen::Vector3d::Unit(axis)) * center.inverse();
+}
+
+bool IsSymmetry(const RegistrationModel& model, const Eigen::Isometry3d& motion) {
+  const ScanSample samples = Thinned({model.sample_points(), {}}, kSymmetryPoints);
+  const double limit_mm = std::max(kSymmetryMm, model.chord_error_mm());
+  return MeanOf(CappedDistances(samples, model, motion, 100 * limit_mm, 1)) <= limit_mm;
+}
+
+PoseScores CompareScores(const ScanSample& sample, const RegistrationModel& model,
+                         const Eigen::Isometry3d& one, const Eigen::Isometry3d& other,
+                         const IcpOptions& options) {
+  const double cap_mm = options.rival_cap_mm;
+  const std::vector<float> of_one = CappedDistances(sample, model, one, cap_mm, options.threads);
+  const std::vector<float> of_other = CappedDistances(sample, model, other, cap_mm, options.threads);
+  double sum_one = 0, sum_other = 0, count = 0;
+  for (std::size_t i = 0; i < sample.size(); ++i) {
+    if (std::min(of_one[i], of_other[i]) >= static_cast<float>(cap_mm)) continue;
+    sum_one += of_one[i];
+    sum_other += of_other[i];
+    ++count;
+  }
+  return {sum_one / std::max(count, 1.0), sum_other / std::max(count, 1.0)};
+}
+
+std::optional<RivalPose> FindRival(const ScanSample& sample, const RegistrationModel& model,
+                                   const Eigen::Isometry3d& start, const Eigen::Isometry3d& found,
+                                   const IcpOptions& options) {
+  const ScanSample some = Thinned(sample, kAlignPoints);
+  const Search search{some, model, found, options};
+  std::optional<RivalPose> strongest;
+  const auto consider = [&](const Eigen::Isometry3d& from, double gate_mm, bool from_start) {
+    auto rival = Settle(search, from, gate_mm);
+    if (!rival || from_start != StartAllows(search, start, rival->model_from_scan)) return;
+    rival->from_start = from_start;
+    if (!strongest || IsStronger(*rival, *strongest, options)) strongest = std::move(rival);
+  };
+  for (const Valley& valley : FindValleys(search)) {
+    consider(valley.model_from_scan, 2 * std::max(options.threshold_floor_mm, model.spacing_mm()), true);
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    const Eigen::Isometry3d turn = HalfTurn(model, axis);
+    if (!IsSymmetry(model, turn)) consider(turn * found, std::max(options.start_translation_mm, 1.0), false);
+  }
+  return strongest;
+}
+
+Status CheckRival(const RivalPose& rival, const IcpOptions& options) {
+  const double limit = rival.from_start ? options.rival_ratio : options.turned_ratio;
+  if (!(rival.scores.other_mm <= limit * rival.scores.one_mm)) return {};
+  return Fail(ErrorCode::kUntrusted,
+              "{}: the pose found leaves a mean distance of {:.4f} mm, another one {:.4f} mm; the ratio must "
+              "be above "
+              "{:.2f}; between them lie {}",
+              rival.from_start ? "the pose is ambiguous" : "the part seems to lie turned",
+              rival.scores.one_mm, rival.scores.other_mm, limit, rival.motion);
+}
+
+}  // namespace forgescan
