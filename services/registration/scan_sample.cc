@@ -8,6 +8,7 @@ namespace forgescan {
 namespace {
 
 constexpr std::size_t kBlock = 16'384;
+constexpr std::size_t kScatter = 2'654'435'761;  // Knuth's multiplier: 2^32 times the golden section
 
 }  // namespace
 
@@ -41,7 +42,10 @@ ScanSample TakeSample(const PointCloud& scan, const std::vector<std::uint32_t>& 
   ScanSample sample;
   sample.points.reserve(indices.size() / step + 1);
   if (!scan.normals.empty()) sample.normals.reserve(indices.size() / step + 1);
-  for (std::size_t at = 0; at < indices.size(); at += step) {
+  for (std::size_t first = 0; first < indices.size(); first += step) {
+    // Anywhere within the step, so that a scan with an order of its own is not sampled by it.
+    const std::size_t at = first + first / step * kScatter % step;
+    if (at >= indices.size()) break;
     const std::uint32_t i = indices[at];
     if (!scan.normals.empty()) {
       const float length = scan.normals[i].norm();

@@ -21,8 +21,8 @@ struct ScanSample {
 std::vector<std::uint32_t> FindInBox(const PointCloud& scan, const RegistrationModel& model,
                                      const Eigen::Isometry3d& start, double margin_mm, unsigned threads);
 
-// Every n-th of the numbered points, with the smallest n that takes at most max_points. Points whose normal
-// has no direction are left out.
+// One of every n of the numbered points, with the smallest n that takes at most max_points; not always the
+// same one of them, but the same in every run. Points whose normal has no direction are left out.
 ScanSample TakeSample(const PointCloud& scan, const std::vector<std::uint32_t>& indices,
                       std::size_t max_points);
 

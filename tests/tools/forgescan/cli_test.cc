@@ -226,6 +226,21 @@ TEST_F(Cli, RegistersAPart) {
   EXPECT_EQ(ReadJson("r2.json"), result);  // for any number of threads
 }
 
+// The block maps onto itself by half turns: any of these poses is right, and none a rival of the other.
+TEST_F(Cli, RegisterFindsAPartWithoutAStart) {
+  std::ofstream(folder_ / "block.stl") << BlockStl();
+  WriteCloud("far.ply", BlockScan({4000, -700, 90}));
+  const std::string call =
+      "register --search --scan far.ply --model block.stl --spacing-mm 2 --out pose.txt ";
+  const CommandOutput output = Call(call + "--json r.json");
+  ASSERT_EQ(output.exit_code, 0) << output.text;
+  const Json result = ReadJson("r.json");
+  EXPECT_LT(result["capped_score_mm"].get<double>(), 0.02);  // the noise's mean is 0.016 mm
+  EXPECT_TRUE(result["rival_ratio"].is_null());
+  std::ofstream(folder_ / "start.txt") << "1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1";
+  EXPECT_NE(Call(call + "--initial start.txt").exit_code, 0);  // either a start or none
+}
+
 TEST_F(Cli, RegisterRefusesWhatItCannotTrust) {
   std::ofstream(folder_ / "block.stl") << BlockStl();
   WriteCloud("far.ply", BlockScan({4000, 0, 0}));
