@@ -7,6 +7,7 @@
 #include "services/common/result.h"
 #include "services/reconstruction/decoded_view.h"
 #include "services/reconstruction/fringe_order_table.h"
+#include "services/reconstruction/packed_decoder.h"
 #include "services/reconstruction/pattern_set.h"
 #include "services/reconstruction/phase_estimator.h"
 #include "services/reconstruction/reconstruction_config.h"
@@ -17,25 +18,35 @@ namespace forgescan {
 // thread.
 class FringeDecoder {
  public:
-  // Errors: those of Check(config), MakePhaseEstimator and MakeFringeOrderTable.
-  static Result<FringeDecoder> Create(PatternSet pattern, const ReconstructionConfig& config);
+  // path: vector instructions to use where PackedDecoder can do the set; nothing = never use it, the plain
+  // arithmetic is the tests' reference. Errors: those of Check(config), MakePhaseEstimator and
+  // MakeFringeOrderTable.
+  static Result<FringeDecoder> Create(PatternSet pattern, const ReconstructionConfig& config,
+                                      std::optional<SimdPath> path = BestSimdPath());
 
   // Shape: pattern.frame_count() frames in order of frame_index, all of one size, CV_8UC1 or CV_16UC1.
+  // recycled: a view that is no longer needed; maps of the right size are written over, which saves the first
+  // touch of 45 MB of fresh memory, about as long as the decoding itself. Its maps must not be shared.
   // Errors: kInvalidArgument for a wrong number, size or type of frames. A view without one valid pixel is a
-  // result. Cost: bench/ holds the figures.
-  Result<DecodedView> Decode(std::span<const cv::Mat> frames) const;
+  // result. Cost: tests/bench/decode_bench.cc.
+  Result<DecodedView> Decode(std::span<const cv::Mat> frames, DecodedView recycled = {}) const;
 
   const PatternSet& pattern() const { return pattern_; }
   const PhaseEstimator& estimator() const { return estimator_; }
   const FringeOrderTable& table() const { return table_; }
+  bool is_packed() const { return packed_.has_value(); }  // for frames of 8 bit
 
  private:
   FringeDecoder() = default;
+  // Which rows have pixels of doubtful order.
+  std::vector<std::uint8_t> DecodeRows(std::span<const cv::Mat> frames, const ReconstructionConfig& config,
+                                       DecodedView& view) const;
 
   PatternSet pattern_;
   ReconstructionConfig config_;
   PhaseEstimator estimator_;
   FringeOrderTable table_;
+  std::optional<PackedDecoder> packed_;
 };
 
 // Errors: kInvalidArgument unless frames are count non-empty images of one size and type, CV_8UC1 or

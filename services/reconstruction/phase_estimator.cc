@@ -45,6 +45,11 @@ double PhaseEstimator::PhaseNoise(int frequency) const {
   return std::sqrt((cosine.row(frequency).squaredNorm() + sine.row(frequency).squaredNorm()) / 2);
 }
 
+double PhaseEstimator::PhaseVariance(int frequency, double phase_rad) const {
+  return (std::cos(phase_rad) * sine.row(frequency) - std::sin(phase_rad) * cosine.row(frequency))
+      .squaredNorm();
+}
+
 double PhaseEstimator::WhiteNoise(int frequency, double contrast) const {
   constexpr int kPhases = 64;
   double worst = 0;

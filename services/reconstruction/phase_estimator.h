@@ -26,6 +26,10 @@ struct PhaseEstimator {
   // Standard deviation of a phase over sigma / B (sigma of a grey value), averaged over all phases: 0.71 for
   // 4 own frames, 1.0 and 1.22 for 3-2-2 shared ones.
   double PhaseNoise(int frequency) const;
+  // Variance of a phase at phase_rad over (sigma / B)^2: 1/2 for 4 own frames; 1 + cos(2 phi) / 2 and
+  // 1.5 + sin(2 phi) / 2 for the three-frame and the two-frame frequencies of a shared 3-2-2 set. To first
+  // order.
+  double PhaseVariance(int frequency, double phase_rad) const;
   // Standard deviation of A + B / contrast, what the reference frame should show, over sigma, at the worst
   // phase.
   double WhiteNoise(int frequency, double contrast) const;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "services/reconstruction/histogram_median.h"
+#include "services/reconstruction/pixel_sampler.h"
 
 namespace forgescan {
 namespace {
@@ -52,6 +53,26 @@ double SquaredDisagreement(const FringeOrderTable& table, const Eigen::VectorXd&
   return sum / table.other_count;
 }
 
+double TurnsOf(const std::complex<double>& phasor) { return std::arg(phasor) / (2 * std::numbers::pi); }
+
+// Rms difference of the other frequencies from the finest one, whose fringe order is that of the coordinate.
+double DisagreementRad(const FringeDecoder& decoder, const std::vector<std::complex<double>>& phasors,
+                       double coordinate_px) {
+  const FringeOrderTable& table = decoder.table();
+  const auto base = static_cast<std::size_t>(table.base);
+  const double turns = TurnsOf(phasors[base]);
+  const double position =
+      (coordinate_px - decoder.pattern().phase_origin_px) / decoder.pattern().frequencies[base].period_px;
+  const double unwrapped = std::round(position - turns) + turns;
+  double sum = 0;
+  for (std::size_t o = 0; o < static_cast<std::size_t>(table.other_count); ++o) {
+    const double off = static_cast<double>(table.ratios[o]) * unwrapped -
+                       TurnsOf(phasors[static_cast<std::size_t>(table.others[o])]);
+    sum += std::pow(off - std::round(off), 2);
+  }
+  return 2 * std::numbers::pi * std::sqrt(sum / table.other_count);
+}
+
 // Rms disagreement per unit of 2nd harmonic ratio, averaged over all phases; 0 where the frames cancel it.
 double HarmonicGain(const FringeDecoder& decoder) {
   constexpr int kSteps = 8;
@@ -80,18 +101,17 @@ class TrustSampler {
  public:
   TrustSampler(std::span<const cv::Mat> frames, const FringeDecoder& decoder,
                const ReconstructionConfig& config)
-      : frames_(frames), decoder_(decoder), noise_(config.noise), scale_(GreyScale(frames[0], config)) {}
+      : pixel_(frames, decoder.estimator(), GreyScale(frames[0], config)),
+        decoder_(decoder),
+        noise_(config.noise) {}
 
   void AddSaturated() { ++saturated_; }
 
-  void Add(int row, int column, double disagreement_rad) {
-    const Eigen::VectorXd grey = Grey(row, column);
+  void Add(int row, int column, double coordinate_px) {
+    const Eigen::VectorXd& grey = pixel_.Grey(row, column);
     const PhaseEstimator& estimator = decoder_.estimator();
-    std::vector<std::complex<double>> phasors;
-    for (Eigen::Index j = 0; j < estimator.cosine.rows(); ++j) {
-      phasors.emplace_back(estimator.cosine.row(j).dot(grey), estimator.sine.row(j).dot(grey));
-    }
-    disagreement_.Add(disagreement_rad);
+    const std::vector<std::complex<double>>& phasors = pixel_.Phasors(row, column);
+    disagreement_.Add(DisagreementRad(decoder_, phasors, coordinate_px));
     predicted_square_ += PredictedSquare(grey, phasors);
     ++lit_;
     if (estimator.redundancy > 0) {
@@ -113,17 +133,6 @@ class TrustSampler {
   }
 
  private:
-  Eigen::VectorXd Grey(int row, int column) const {
-    Eigen::VectorXd grey(static_cast<Eigen::Index>(frames_.size()));
-    for (std::size_t i = 0; i < frames_.size(); ++i) {
-      const cv::Mat& frame = frames_[i];
-      grey(static_cast<Eigen::Index>(i)) =
-          scale_ * (frame.depth() == CV_8U ? frame.at<std::uint8_t>(row, column)
-                                           : frame.at<std::uint16_t>(row, column));
-    }
-    return grey;
-  }
-
   double PredictedSquare(const Eigen::VectorXd& grey,
                          const std::vector<std::complex<double>>& phasors) const {
     double sum = 0;
@@ -164,10 +173,9 @@ class TrustSampler {
     figures.noise_dn = std::sqrt(std::max(residual_square_ - explained, 0.0) / freedom);
   }
 
-  std::span<const cv::Mat> frames_;
+  PixelSampler pixel_;
   const FringeDecoder& decoder_;
   CameraNoise noise_;
-  double scale_;
   HistogramMedian disagreement_{0, 4, 40000};
   long lit_ = 0;
   long saturated_ = 0;
@@ -186,9 +194,7 @@ bool IsLit(MaskCause cause) {
 
 Result<TrustFigures> MeasureTrust(std::span<const cv::Mat> frames, const DecodedView& view,
                                   const FringeDecoder& decoder, const ReconstructionConfig& config) {
-  constexpr double kSamples = 20000;
-  const int step =
-      std::max(1, static_cast<int>(std::sqrt(static_cast<double>(view.cause.total()) / kSamples)));
+  const int step = SamplingStep(view.cause.size());
   TrustSampler sampler(frames, decoder, config);
   for (int row = step / 2; row < view.cause.rows; row += step) {
     for (int column = step / 2; column < view.cause.cols; column += step) {
@@ -196,7 +202,7 @@ Result<TrustFigures> MeasureTrust(std::span<const cv::Mat> frames, const Decoded
       if (cause == MaskCause::kSaturated) {
         sampler.AddSaturated();
       } else if (IsLit(cause)) {
-        sampler.Add(row, column, static_cast<double>(view.disagreement_rad(row, column)));
+        sampler.Add(row, column, static_cast<double>(view.coordinate_px(row, column)));
       }
     }
   }
