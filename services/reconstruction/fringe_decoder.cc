@@ -20,17 +20,6 @@ namespace {
 constexpr double kFullScaleDn = 255;
 constexpr double kRounding = 1e-5;  // of a grey value scaled in single precision
 
-DecodedView MakeView(cv::Size size, DecodedView recycled) {
-  DecodedView view;
-  view.coordinate_px = std::move(recycled.coordinate_px);
-  view.sigma_px = std::move(recycled.sigma_px);
-  view.cause = std::move(recycled.cause);
-  view.coordinate_px.create(size);
-  view.sigma_px.create(size);
-  view.cause.create(size);
-  return view;
-}
-
 // By the plain arithmetic. Returns whether the row has pixels of doubtful order.
 bool DecodeRow(std::span<const cv::Mat> frames, int row, StripDecoder& strip, DecodedView& view) {
   constexpr auto kDoubtful = static_cast<std::int32_t>(MaskCause::kUnwrapMargin);
@@ -55,7 +44,7 @@ void TakeMedians(std::span<const cv::Mat> frames, const FringeDecoder& decoder, 
   HistogramMedian modulation(0, 256, 4096);
   HistogramMedian sigma(0, 2, 4000);
   PixelSampler sampler(frames, decoder.estimator(), scale);
-  const int step = SamplingStep(view.cause.size());
+  const int step = 2 * SamplingStep(view.cause.size());  // 5000 are plenty for a median
   for (int row = step / 2; row < view.cause.rows; row += step) {
     for (int column = step / 2; column < view.cause.cols; column += step) {
       if (view.cause(row, column) == static_cast<std::uint8_t>(MaskCause::kValid)) {
@@ -104,6 +93,7 @@ Result<FringeDecoder> FringeDecoder::Create(PatternSet pattern, const Reconstruc
                                                         config.dead_margin_fraction));
   decoder.config_ = config;
   decoder.pattern_ = std::move(pattern);
+  decoder.path_ = path.value_or(SimdPath::kBaseline);
   if (path) {
     decoder.packed_ =
         PackedDecoder::Make({decoder.pattern_, config, decoder.estimator_, decoder.table_}, *path);
@@ -128,9 +118,9 @@ std::vector<std::uint8_t> FringeDecoder::DecodeRows(std::span<const cv::Mat> fra
   return doubtful;
 }
 
-Result<DecodedView> FringeDecoder::Decode(std::span<const cv::Mat> frames, DecodedView recycled) const {
+Result<DecodedView> FringeDecoder::Decode(std::span<const cv::Mat> frames) const {
   RETURN_IF_ERROR(CheckFrames(frames, pattern_.frame_count()));
-  DecodedView view = MakeView(frames[0].size(), std::move(recycled));
+  DecodedView view = pool_->Take(frames[0].size());
   ReconstructionConfig config = config_;
   if (const auto level = FindClippingLevel(frames, pattern_, config_.threads)) {
     const double clipping_dn = GreyScale(frames[0], config_) * *level;
@@ -142,7 +132,7 @@ Result<DecodedView> FringeDecoder::Decode(std::span<const cv::Mat> frames, Decod
   const std::vector<std::uint8_t> doubtful = DecodeRows(frames, config, view);
   const double period_px = pattern_.frequencies[static_cast<std::size_t>(table_.base)].period_px;
   view.repaired = RepairFringeOrders(doubtful, period_px, config_, view);
-  DropMaskBorder(config_, view);
+  DropMaskBorder(config_, path_, view);
   TakeMedians(frames, *this, GreyScale(frames[0], config_), view);
   return view;
 }

@@ -1,8 +1,12 @@
 // One camera's frames -> absolute projector coordinate of every pixel.
 #pragma once
 
+#include <memory>
 #include <opencv2/core/mat.hpp>
+#include <optional>
 #include <span>
+#include <utility>
+#include <vector>
 
 #include "services/common/result.h"
 #include "services/reconstruction/decoded_view.h"
@@ -11,6 +15,7 @@
 #include "services/reconstruction/pattern_set.h"
 #include "services/reconstruction/phase_estimator.h"
 #include "services/reconstruction/reconstruction_config.h"
+#include "services/reconstruction/view_pool.h"
 
 namespace forgescan {
 
@@ -25,11 +30,12 @@ class FringeDecoder {
                                       std::optional<SimdPath> path = BestSimdPath());
 
   // Shape: pattern.frame_count() frames in order of frame_index, all of one size, CV_8UC1 or CV_16UC1.
-  // recycled: a view that is no longer needed; maps of the right size are written over, which saves the first
-  // touch of 45 MB of fresh memory, about as long as the decoding itself. Its maps must not be shared.
   // Errors: kInvalidArgument for a wrong number, size or type of frames. A view without one valid pixel is a
   // result. Cost: tests/bench/decode_bench.cc.
-  Result<DecodedView> Decode(std::span<const cv::Mat> frames, DecodedView recycled = {}) const;
+  Result<DecodedView> Decode(std::span<const cv::Mat> frames) const;
+
+  // Takes back a view that is no longer needed; the next one is decoded into its maps.
+  void Recycle(DecodedView view) const { pool_->Give(std::move(view)); }
 
   const PatternSet& pattern() const { return pattern_; }
   const PhaseEstimator& estimator() const { return estimator_; }
@@ -46,6 +52,8 @@ class FringeDecoder {
   ReconstructionConfig config_;
   PhaseEstimator estimator_;
   FringeOrderTable table_;
+  std::shared_ptr<ViewPool> pool_ = std::make_shared<ViewPool>();
+  SimdPath path_ = SimdPath::kBaseline;
   std::optional<PackedDecoder> packed_;
 };
 

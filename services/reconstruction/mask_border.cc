@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "services/common/parallel_rows.h"
+#include "services/reconstruction/mask_kernel.h"
 
 namespace forgescan {
 namespace {
@@ -18,12 +19,13 @@ using Counts = std::array<long, kMaskCauses>;
 // Widens the masks of a block of rows, from a copy of the rows around it as they were before.
 class BlockBorder {
  public:
-  BlockBorder(int radius_px, int width_px)
-      : radius_(radius_px),
+  BlockBorder(int radius_px, int width_px, SimdPath path)
+      : kernel_(path),
+        radius_(radius_px),
         width_(static_cast<std::size_t>(width_px)),
         padded_(width_ + 2 * static_cast<std::size_t>(radius_px)),
         ring_(2 * static_cast<std::size_t>(radius_px) + 1, std::vector<std::uint8_t>(width_)),
-        any_(width_) {}
+        near_(width_) {}
 
   // before: the rows as they were; a row beyond the image is nullptr. rows: [begin, end).
   void Run(const std::function<const std::uint8_t*(int)>& before, int begin, int end,
@@ -50,35 +52,23 @@ class BlockBorder {
       return;
     }
     std::copy_n(cause, width_, padded_.begin() + radius_);
-    std::copy_n(padded_.begin(), width_, wide.begin());
-    for (std::size_t shift = 1; shift < ring_.size(); ++shift) {
-      const std::uint8_t* const from = padded_.data() + shift;
-      std::uint8_t* const to = wide.data();
-      for (std::size_t x = 0; x < width_; ++x) {
-        to[x] |= from[x];
-      }
-    }
+    kernel_.Widen(padded_, 2 * radius_, wide);
   }
 
   void Mark(std::uint8_t* cause) {
-    any_ = ring_[0];
+    near_ = ring_[0];
     for (std::size_t slot = 1; slot < ring_.size(); ++slot) {
-      const std::uint8_t* const from = ring_[slot].data();
-      for (std::size_t x = 0; x < width_; ++x) {
-        any_[x] |= from[x];
-      }
+      kernel_.Join(ring_[slot], near_);
     }
-    for (std::size_t x = 0; x < width_; ++x) {
-      const auto border = static_cast<std::uint8_t>(any_[x] != 0 ? kBorder : 0);
-      cause[x] = cause[x] == 0 ? border : cause[x];
-    }
+    kernel_.Mark(near_, kBorder, {cause, width_});
   }
 
+  MaskKernel kernel_;
   int radius_;
   std::size_t width_;
   std::vector<std::uint8_t> padded_;
   std::vector<std::vector<std::uint8_t>> ring_;
-  std::vector<std::uint8_t> any_;
+  std::vector<std::uint8_t> near_;
 };
 
 // Causes come in long runs: eight at a time where they are equal.
@@ -119,14 +109,14 @@ struct Edges {
 
 }  // namespace
 
-void DropMaskBorder(const ReconstructionConfig& config, DecodedView& view) {
+void DropMaskBorder(const ReconstructionConfig& config, SimdPath path, DecodedView& view) {
   cv::Mat_<std::uint8_t>& cause = view.cause;
   const int radius = config.mask_border_px;
   const Edges edges(cause, radius);
   const int blocks = (cause.rows + kBlockRows - 1) / kBlockRows;
   std::vector<Counts> counts(static_cast<std::size_t>(blocks), Counts{});
   ParallelRows(config.threads, blocks, [&](int first, int last) {
-    BlockBorder border(radius, cause.cols);
+    BlockBorder border(radius, cause.cols, path);
     for (int block = first; block < last; ++block) {
       const int begin = block * kBlockRows, end = std::min(begin + kBlockRows, cause.rows);
       const auto before = [&](int row) -> const std::uint8_t* {

@@ -60,6 +60,24 @@ bool IsEquation4(const PatternSet& pattern, const PhaseEstimator& estimator,
   return true;
 }
 
+// The kernel's squares: of small numbers over 2^8, of large ones over 2^12.
+constexpr double kSmall = 256;
+constexpr double kLarge = 4096;
+
+// Of a square in units of the kernel: so many variances of a grey value.
+PackedLimit Limit(const ReconstructionConfig& config, double variances) {
+  return {.base = Steps(variances * kVariance * std::pow(config.noise.read_noise_dn, 2), 1),
+          .per_level = Steps(variances * kVariance * config.noise.gain_dn / 2, 512)};
+}
+
+// Whether so many variances of the brightest grey value are a limit below the kernel's largest square.
+bool Fits(const ReconstructionConfig& config, double variances) {
+  constexpr double kFullScaleDn = 255, kLargest = 60000;
+  const double brightest = std::pow(config.noise.read_noise_dn, 2) + kFullScaleDn * config.noise.gain_dn;
+  return variances * kVariance * brightest < kLargest &&
+         variances * kVariance * config.noise.gain_dn / 2 * 512 < kLargest;
+}
+
 double RatioToFirst(const PatternSet& pattern, std::size_t frequency) {
   return pattern.frequencies[frequency].modulation_ratio / pattern.frequencies[0].modulation_ratio;
 }
@@ -68,8 +86,19 @@ bool IsInRange(const PackedDecoder::Set& set) {
   const bool ratios_fit = std::ranges::all_of(std::array<std::size_t, 3>{0, 1, 2}, [&](std::size_t j) {
     return RatioToFirst(set.pattern, j) > 0.5 && RatioToFirst(set.pattern, j) < 1.9;
   });
-  return ratios_fit && set.pattern.reference_contrast > 0.51 && set.config.modulation_ratio_tolerance < 1 &&
-         set.config.reference_tolerance_modulation < 1;
+  double least_noise = 100;
+  for (int j = 0; j < 3; ++j) {
+    least_noise = std::min(least_noise, set.estimator.PhaseNoise(j));
+  }
+  const ReconstructionConfig& config = set.config;
+  const double reference_noise = set.estimator.ReferenceNoise(0, set.pattern.ReferencePerModulation());
+  const bool limits_fit =
+      Fits(config, std::pow(config.min_modulation_sigma, 2) / kSmall) && Fits(config, 25 / kSmall) &&
+      Fits(config, std::pow(least_noise / config.max_phase_sigma_rad, 2) / kLarge) &&
+      Fits(config,
+           std::pow(config.reference_tolerance_sigma, 2) * (reference_noise * reference_noise + 1) / kSmall);
+  return ratios_fit && limits_fit && set.pattern.reference_contrast > 0.51 &&
+         set.config.modulation_ratio_tolerance < 1 && set.config.reference_tolerance_modulation < 1;
 }
 
 }  // namespace
@@ -120,7 +149,8 @@ void PackedDecoder::SetOrders(const Set& set) {
   constants_.period_px = static_cast<float>(period_px / kTurn);
   constants_.first_order_px = static_cast<float>(set.pattern.phase_origin_px + first * period_px);
   const double limit = std::min(set.config.max_pixel_disagreement_rad, 4.0) / kTwoPi * kTurn;
-  constants_.max_disagreement = static_cast<std::uint32_t>(2 * limit * limit);
+  constants_.max_disagreement =
+      Steps(2 * limit * limit / 32768, 1);  // of at most two half turns, which never exceed it
   constants_.first_px = table.first_px;
   constants_.last_px = table.last_px;
 }
@@ -129,16 +159,14 @@ void PackedDecoder::SetMasks(const Set& set) {
   const ReconstructionConfig& config = set.config;
   constexpr double kRatioSigmas = 5;  // as StripDecoder
   constants_.min_modulation = Steps(config.min_modulation_dn, kPerDn);
-  constants_.grey_variance = static_cast<float>(kVariance * std::pow(config.noise.read_noise_dn, 2));
-  constants_.grey_variance_per_level = static_cast<float>(kVariance * config.noise.gain_dn / 2);
-  constants_.low_variances = static_cast<float>(std::pow(config.min_modulation_sigma, 2));
-  constants_.ratio_variances = static_cast<float>(kRatioSigmas * kRatioSigmas);
+  constants_.low_limit = Limit(config, std::pow(config.min_modulation_sigma, 2) / kSmall);
+  constants_.ratio_limit = Limit(config, kRatioSigmas * kRatioSigmas / kSmall);
   constants_.ratio_tolerance = Steps(config.modulation_ratio_tolerance, kTurn);
   double least_noise = 100;
   for (const std::size_t frequency : frequency_) {
     least_noise = std::min(least_noise, set.estimator.PhaseNoise(static_cast<int>(frequency)));
   }
-  constants_.noise_variances = static_cast<float>(std::pow(least_noise / config.max_phase_sigma_rad, 2));
+  constants_.noise_limit = Limit(config, std::pow(least_noise / config.max_phase_sigma_rad, 2) / kLarge);
   for (std::size_t slot = 0; slot < 3; ++slot) {
     const double noise = set.estimator.PhaseNoise(static_cast<int>(frequency_[slot]));
     constants_.quietness[slot] = Steps(least_noise / noise, kTurn);
@@ -153,14 +181,14 @@ void PackedDecoder::SetReference(const Set& set) {
     return;
   }
   frame_[7] = static_cast<std::size_t>(*set.pattern.reference_frame_index);
-  const double noise = std::pow(set.estimator.WhiteNoise(0, set.pattern.reference_contrast), 2);
+  const double noise = std::pow(set.estimator.ReferenceNoise(0, set.pattern.ReferencePerModulation()), 2);
   const double limit = std::pow(set.config.reference_tolerance_sigma, 2) * kVariance;
   const double read = std::pow(set.config.noise.read_noise_dn, 2), gain = set.config.noise.gain_dn;
-  constants_.reference_per_modulation = Steps(1 / set.pattern.reference_contrast, 32768);
+  constants_.reference_per_modulation = Steps(set.pattern.ReferencePerModulation(), 32768);
   constants_.reference_tolerance = Steps(set.config.reference_tolerance_modulation, kTurn);
-  constants_.reference_variance = static_cast<float>(limit * read * (noise + 1));
-  constants_.reference_variance_per_level = static_cast<float>(limit * noise * gain / 2);
-  constants_.reference_variance_per_white = static_cast<float>(limit * gain / kPerDn);
+  constants_.white_limit = {.base = Steps(limit * read * (noise + 1) / kSmall, 1),
+                            .per_level = Steps(limit * noise * gain / 2 / kSmall, 512)};
+  constants_.white_limit_per_white = Steps(limit * gain / kPerDn / kSmall, 16384);
 }
 
 void PackedDecoder::SetSigma(const Set& set) {

@@ -9,6 +9,12 @@
 
 namespace forgescan {
 
+// A limit that grows with the noise of light: base + per_level / 2^9 for each unit of 2 A, DN.
+struct PackedLimit {
+  std::uint16_t base = 0;
+  std::uint16_t per_level = 0;
+};
+
 // Eq. (4) of the paper as whole numbers: 2 A = I11 + I13, 2 C1 = I11 - I13, 2 S1 = 2 A - 2 I12, 2 Cj = 2 Ij1
 // - 2 A, 2 Sj = 2 A - 2 Ij2. Slot 0 is the frequency with three frames. Units: a phase is 2^-16 turn, a
 // modulation or contrast 1/64 DN. A phase is within 1.5e-4 rad of the exact one, a hundredth of the noise of
@@ -25,26 +31,23 @@ struct PackedConstants {
   float period_px = 0;                         // finest period, over 2^16
   float first_order_px = 0;                    // where the first order begins
   std::array<float, 2> gain_px{};      // px of the coordinate per 2^-16 turn of the others' disagreement
-  std::uint32_t max_disagreement = 0;  // sum of squares
+  std::uint16_t max_disagreement = 0;  // half the sum of the squares, 2^-16 turn^2 / 4
   float first_px = 0;
   float last_px = 0;
 
   std::uint8_t saturation_dn = 255;
   std::uint16_t min_modulation = 0;
-  float grey_variance = 0;                   // (1/64 DN)^2 of a grey value: at 0 DN
-  float grey_variance_per_level = 0;         // and per unit of 2 A
-  float low_variances = 0;                   // squared modulation over grey variance below which light is low
-  float noise_variances = 0;                 // squared least scaled modulation over grey variance
+  PackedLimit low_limit;                     // of the least modulation, squared, >> 8
+  PackedLimit noise_limit;                   // of the least modulation scaled by quietness, squared, >> 12
+  PackedLimit ratio_limit;                   // of the excess of a ratio, squared, >> 8
   std::array<std::uint16_t, 3> quietness{};  // 2^-16: least phase noise of the slots over this slot's
   std::array<std::uint16_t, 3> ratio{};      // 2^-15: modulation over the first slot's
   std::uint16_t ratio_tolerance = 0;         // 2^-16
-  float ratio_variances = 0;                 // excess of a ratio, squared, over grey variance
 
   std::uint16_t reference_per_modulation = 0;  // 2^-15
   std::uint16_t reference_tolerance = 0;       // 2^-16 of the modulation
-  float reference_variance = 0;                // squared limit: at 0 DN
-  float reference_variance_per_level = 0;      // per unit of 2 A
-  float reference_variance_per_white = 0;      // per 1/64 DN of the white expected
+  PackedLimit white_limit;                     // of what the reference is off, squared, >> 8
+  std::uint16_t white_limit_per_white = 0;     // 2^-14, per 1/64 DN expected
 
   std::array<std::int16_t, 3> influence{};  // 2^-15: of a slot's phase on the coordinate, scaled to 1 in all
   float sigma_scale_px = 0;

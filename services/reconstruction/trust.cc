@@ -1,6 +1,7 @@
 #include "services/reconstruction/trust.h"
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 #include <complex>
 #include <numbers>
@@ -103,7 +104,8 @@ class TrustSampler {
                const ReconstructionConfig& config)
       : pixel_(frames, decoder.estimator(), GreyScale(frames[0], config)),
         decoder_(decoder),
-        noise_(config.noise) {}
+        noise_(config.noise),
+        errors_(decoder.estimator().cosine.rows()) {}
 
   void AddSaturated() { ++saturated_; }
 
@@ -113,6 +115,7 @@ class TrustSampler {
     const std::vector<std::complex<double>>& phasors = pixel_.Phasors(row, column);
     disagreement_.Add(DisagreementRad(decoder_, phasors, coordinate_px));
     predicted_square_ += PredictedSquare(grey, phasors);
+    AddDrift(grey, phasors);
     ++lit_;
     if (estimator.redundancy > 0) {
       AddResidual(estimator.residual * grey, phasors);
@@ -129,17 +132,51 @@ class TrustSampler {
     figures.predicted_disagreement_rad = std::sqrt(predicted_square_ / static_cast<double>(lit_));
     figures.saturated_fraction = static_cast<double>(saturated_) / static_cast<double>(saturated_ + lit_);
     FinishHarmonic(figures);
+    if (drift_ratio_.total() > 0) {
+      const auto& gains = decoder_.estimator().drift_gain;
+      figures.drift_dn = drift_dn_.Median();
+      figures.drift_phase_rad =
+          std::abs(drift_ratio_.Median()) * *std::max_element(gains.begin(), gains.end());
+    }
     return figures;
   }
 
  private:
+  // The reference shows the background at its own time, the fringes at theirs.
+  void AddDrift(const Eigen::VectorXd& grey, const std::vector<std::complex<double>>& phasors) {
+    constexpr double kUncut = 250;  // DN: a brighter reference may be saturated
+    const PatternSet& pattern = decoder_.pattern();
+    const PhaseEstimator& estimator = decoder_.estimator();
+    if (!pattern.reference_frame_index || grey(*pattern.reference_frame_index) > kUncut) {
+      return;
+    }
+    const double modulation = std::abs(phasors[0]);
+    double drift = 0;
+    if (estimator.drift) {
+      drift = estimator.drift->dot(grey);
+    } else {
+      const double level =
+          estimator.background.row(0).dot(grey) + pattern.ReferencePerModulation() * modulation;
+      const auto times = Eigen::VectorXd::LinSpaced(grey.size(), 0, static_cast<double>(grey.size() - 1));
+      drift = (grey(*pattern.reference_frame_index) - level) /
+              (*pattern.reference_frame_index - estimator.background.row(0).dot(times));
+    }
+    drift_dn_.Add(drift);
+    drift_ratio_.Add(drift / modulation);
+  }
+
+  // Without a matrix of its own: it is done for every sample.
   double PredictedSquare(const Eigen::VectorXd& grey,
-                         const std::vector<std::complex<double>>& phasors) const {
+                         const std::vector<std::complex<double>>& phasors) {
+    const PhaseEstimator& estimator = decoder_.estimator();
     double sum = 0;
     for (Eigen::Index i = 0; i < grey.size(); ++i) {
-      const double sigma = std::sqrt(noise_.read_noise_dn * noise_.read_noise_dn + noise_.gain_dn * grey(i));
-      const Eigen::VectorXd change = sigma * Eigen::VectorXd::Unit(grey.size(), i);
-      sum += SquaredDisagreement(decoder_.table(), PhaseErrors(decoder_.estimator(), phasors, change));
+      for (Eigen::Index j = 0; j < errors_.size(); ++j) {
+        const std::complex<double>& p = phasors[static_cast<std::size_t>(j)];
+        errors_(j) = (p.real() * estimator.sine(j, i) - p.imag() * estimator.cosine(j, i)) / std::norm(p);
+      }
+      const double variance = noise_.read_noise_dn * noise_.read_noise_dn + noise_.gain_dn * grey(i);
+      sum += variance * SquaredDisagreement(decoder_.table(), errors_);
     }
     return sum;
   }
@@ -176,7 +213,10 @@ class TrustSampler {
   PixelSampler pixel_;
   const FringeDecoder& decoder_;
   CameraNoise noise_;
+  Eigen::VectorXd errors_;  // of the phases, scratch
   HistogramMedian disagreement_{0, 4, 40000};
+  HistogramMedian drift_dn_{-32, 32, 32000};
+  HistogramMedian drift_ratio_{-0.5, 0.5, 20000};
   long lit_ = 0;
   long saturated_ = 0;
   double predicted_square_ = 0;
@@ -231,6 +271,13 @@ Status JudgeTrust(const TrustFigures& figures, const FringeDecoder& decoder,
                 shared ? "this projector is not linear enough for a shared background, or a frame is not "
                          "what the pattern set says"
                        : "a frame is not what the pattern set says, or the scene moved");
+  }
+  if (shared && figures.drift_phase_rad && *figures.drift_phase_rad > config.max_drift_phase_rad) {
+    return Fail(ErrorCode::kUntrusted,
+                "the background of the {} camera drifts by {:.2f} grey values a frame, which bends the "
+                "phases by up to {:.3f} "
+                "rad, limit {:.3f}: too much for a shared background",
+                camera, *figures.drift_dn, *figures.drift_phase_rad, config.max_drift_phase_rad);
   }
   const auto harmonic =
       figures.second_harmonic_ratio ? figures.second_harmonic_ratio : figures.suspected_second_harmonic;

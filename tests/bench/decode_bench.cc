@@ -97,7 +97,8 @@ void BM_Ours(benchmark::State& state, int threads, std::optional<SimdPath> path)
   const FringeDecoder decoder = MakeDecoder(threads, path);
   DecodedView view;
   for (auto _ : state) {
-    auto result = decoder.Decode(TheCase().scene.frames, std::move(view));
+    decoder.Recycle(std::move(view));
+    auto result = decoder.Decode(TheCase().scene.frames);
     if (!result.ok()) return state.SkipWithError(result.error().message.c_str());
     view = std::move(result).value();
   }

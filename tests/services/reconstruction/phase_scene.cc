@@ -73,7 +73,7 @@ std::vector<cv::Mat> RenderLight(const Columns& columns, const Light& light, con
     }
   }
   if (pattern.reference_frame_index) {
-    expose(*pattern.reference_frame_index, 0, 1 / pattern.reference_contrast);
+    expose(*pattern.reference_frame_index, 0, pattern.ReferencePerModulation());
   }
   return frames;
 }
