@@ -77,6 +77,18 @@ TEST(BackgroundDrift, CostsLeastWithTheThreeFramesInTheMiddleAndNothingWithAMidG
               ElementsAre(near(0), near(0), near(0)));
 }
 
+// What the interpolation costs in noise, by the plain solution of eight equations.
+TEST(BackgroundDrift, AMidGreyFramePaysWithNoise) {
+  const auto noise = [](const PatternSet& pattern) {
+    const auto estimator = MakePhaseEstimator(pattern);
+    return std::vector{estimator->PhaseNoise(0), estimator->PhaseNoise(1), estimator->PhaseNoise(2)};
+  };
+  const auto near = [](double value) { return DoubleNear(value, 0.01); };
+  EXPECT_THAT(noise(WithMidGrey(StationPattern(Background::kShared))),
+              ElementsAre(near(1.65), near(1.02), near(1.22)));
+  EXPECT_THAT(noise(WithMidGrey(ThreeFirst())), ElementsAre(near(1.01), near(1.16), near(1.27)));
+}
+
 // Coordinates of 31 px fringes, px rms; B = 80 DN. The noise of such a coordinate is 0.07 px at sigma = 1.6
 // DN.
 TEST(BackgroundDrift, CostsOfACoordinateBySimulation) {
@@ -125,7 +137,7 @@ TEST(BackgroundDrift, IsMeasuredInEveryViewAndRefusedWhereTheBackgroundIsShared)
           WithMidGrey(StationPattern(Background::kShared)), WithMidGrey(StationPattern(Background::kOwn))}) {
       const Trial trial = Try(pattern, drift_dn, kModulationDn);
       EXPECT_NEAR(trial.figures.drift_dn.value(), drift_dn,
-                  0.03);  // DN; the median of 30,000 pixels of 0.5 DN noise
+                  0.05);  // DN; B is off by the drift as well, to second order
       EXPECT_TRUE(trial.verdict.ok()) << trial.verdict.error().message;
     }
   }
