@@ -1,5 +1,6 @@
 #include "services/reconstruction/clipping.h"
 
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
@@ -8,12 +9,12 @@
 namespace forgescan {
 namespace {
 
-constexpr int kRowStep = 4;
 using Histogram = std::vector<long>;
 
 template <typename Pixel>
 void CountRows(const cv::Mat& frame, Histogram& histogram) {
-  for (int row = 0; row < frame.rows; row += kRowStep) {
+  constexpr int kRows = 32;
+  for (int row = 0; row < frame.rows; row += std::max(4, frame.rows / kRows)) {
     const Pixel* const grey = frame.ptr<Pixel>(row);
     for (int column = 0; column < frame.cols; ++column) {
       ++histogram[grey[column]];

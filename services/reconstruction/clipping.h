@@ -11,7 +11,7 @@ namespace forgescan {
 
 // The grey value at which the fringe frames were cut: their largest one, if it occurs far more often than the
 // ones just below it. An unclipped maximum is the end of a tail; even the crests of ideal fringes without
-// noise are only twice as frequent as what is below. Every fourth row is looked at; a plain white reference
+// noise are only twice as frequent as what is below. About 32 rows are looked at; a plain white reference
 // frame is left out. Shape: as FringeDecoder::Decode. Units: raw grey values of the frames. nullopt: not cut,
 // or on fewer than 1 in 10,000 of the values.
 std::optional<int> FindClippingLevel(std::span<const cv::Mat> frames, const PatternSet& pattern, int threads);

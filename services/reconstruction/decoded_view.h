@@ -35,14 +35,12 @@ constexpr std::string_view NameOf(MaskCause cause) {
 struct DecodedView {
   cv::Mat_<float> coordinate_px;  // projector column; the estimate even where masked, so always look at cause
   cv::Mat_<float> sigma_px;       // its predicted standard deviation, projector px
-  cv::Mat_<float> modulation_dn;  // the least B of the frequencies
-  cv::Mat_<float> disagreement_rad;       // rms difference of the other frequencies from the finest one
-  cv::Mat_<std::uint8_t> cause;           // MaskCause
+  cv::Mat_<std::uint8_t> cause;   // MaskCause
   std::array<long, kMaskCauses> count{};  // pixels by cause; their sum is the image
   long repaired = 0;  // valid pixels whose fringe order was doubtful and came from their neighbours
   std::optional<double> clipping_dn;  // where the camera cut off grey values, if below saturation_fraction
-  double median_modulation_dn = 0;    // over valid pixels
-  double median_sigma_px = 0;         // over valid pixels
+  double median_modulation_dn = 0;    // the least B of the frequencies, over valid pixels of a regular grid
+  double median_sigma_px = 0;         // over the same pixels
 };
 
 }  // namespace forgescan

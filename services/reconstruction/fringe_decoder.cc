@@ -1,7 +1,7 @@
 #include "services/reconstruction/fringe_decoder.h"
 
 #include <algorithm>
-#include <functional>
+#include <cmath>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -10,6 +10,8 @@
 #include "services/reconstruction/clipping.h"
 #include "services/reconstruction/fringe_order_repair.h"
 #include "services/reconstruction/histogram_median.h"
+#include "services/reconstruction/mask_border.h"
+#include "services/reconstruction/pixel_sampler.h"
 #include "services/reconstruction/strip_decoder.h"
 
 namespace forgescan {
@@ -18,50 +20,35 @@ namespace {
 constexpr double kFullScaleDn = 255;
 constexpr double kRounding = 1e-5;  // of a grey value scaled in single precision
 
-DecodedView MakeView(cv::Size size) {
-  DecodedView view;
-  view.coordinate_px.create(size);
-  view.sigma_px.create(size);
-  view.modulation_dn.create(size);
-  view.disagreement_rad.create(size);
-  view.cause.create(size);
-  return view;
-}
-
-void Store(const StripDecoder& strip, int row, int column, int length, DecodedView& view) {
-  std::copy_n(strip.coordinate_px.begin(), length, view.coordinate_px[row] + column);
-  std::copy_n(strip.sigma_px.begin(), length, view.sigma_px[row] + column);
-  std::copy_n(strip.modulation_dn.begin(), length, view.modulation_dn[row] + column);
-  std::copy_n(strip.disagreement_rad.begin(), length, view.disagreement_rad[row] + column);
-  std::uint8_t* const cause = view.cause[row] + column;
-  for (int x = 0; x < length; ++x) {
-    cause[x] = static_cast<std::uint8_t>(strip.cause[static_cast<std::size_t>(x)]);
+// By the plain arithmetic. Returns whether the row has pixels of doubtful order.
+bool DecodeRow(std::span<const cv::Mat> frames, int row, StripDecoder& strip, DecodedView& view) {
+  constexpr auto kDoubtful = static_cast<std::int32_t>(MaskCause::kUnwrapMargin);
+  bool doubts = false;
+  for (int column = 0; column < view.cause.cols; column += StripDecoder::kLength) {
+    const int length = std::min(StripDecoder::kLength, view.cause.cols - column);
+    strip.Load(frames, row, column, length);
+    strip.Decode();
+    std::copy_n(strip.coordinate_px.begin(), length, view.coordinate_px[row] + column);
+    std::copy_n(strip.sigma_px.begin(), length, view.sigma_px[row] + column);
+    std::transform(strip.cause.begin(), strip.cause.begin() + length, view.cause[row] + column,
+                   [](std::int32_t cause) { return static_cast<std::uint8_t>(cause); });
+    doubts = std::find(strip.cause.begin(), strip.cause.begin() + length, kDoubtful) !=
+                 strip.cause.begin() + length ||
+             doubts;
   }
+  return doubts;
 }
 
-void CountCauses(int threads, DecodedView& view) {
-  std::vector<std::array<long, kMaskCauses>> rows(static_cast<std::size_t>(view.cause.rows));
-  ParallelRows(threads, view.cause.rows, [&](int begin, int end) {
-    for (int row = begin; row < end; ++row) {
-      const std::uint8_t* const cause = view.cause[row];
-      for (int column = 0; column < view.cause.cols; ++column) {
-        ++rows[static_cast<std::size_t>(row)][cause[column]];
-      }
-    }
-  });
-  for (const auto& row : rows) {
-    std::transform(row.begin(), row.end(), view.count.begin(), view.count.begin(), std::plus<>());
-  }
-}
-
-void TakeMedians(DecodedView& view) {
-  constexpr int kRowStep = 8;  // every eighth row is plenty for a median
+void TakeMedians(std::span<const cv::Mat> frames, const FringeDecoder& decoder, double scale,
+                 DecodedView& view) {
   HistogramMedian modulation(0, 256, 4096);
   HistogramMedian sigma(0, 2, 4000);
-  for (int row = kRowStep / 2; row < view.cause.rows; row += kRowStep) {
-    for (int column = 0; column < view.cause.cols; ++column) {
+  PixelSampler sampler(frames, decoder.estimator(), scale);
+  const int step = 2 * SamplingStep(view.cause.size());  // 5000 are plenty for a median
+  for (int row = step / 2; row < view.cause.rows; row += step) {
+    for (int column = step / 2; column < view.cause.cols; column += step) {
       if (view.cause(row, column) == static_cast<std::uint8_t>(MaskCause::kValid)) {
-        modulation.Add(static_cast<double>(view.modulation_dn(row, column)));
+        modulation.Add(sampler.LeastModulation(row, column));
         sigma.Add(static_cast<double>(view.sigma_px(row, column)));
       }
     }
@@ -97,7 +84,8 @@ double GreyScale(const cv::Mat& frame, const ReconstructionConfig& config) {
   return frame.depth() == CV_8U ? 1 : kFullScaleDn / config.full_scale_16bit_dn;
 }
 
-Result<FringeDecoder> FringeDecoder::Create(PatternSet pattern, const ReconstructionConfig& config) {
+Result<FringeDecoder> FringeDecoder::Create(PatternSet pattern, const ReconstructionConfig& config,
+                                            std::optional<SimdPath> path) {
   RETURN_IF_ERROR(Check(config));
   FringeDecoder decoder;
   ASSIGN_OR_RETURN(decoder.estimator_, MakePhaseEstimator(pattern));
@@ -105,13 +93,34 @@ Result<FringeDecoder> FringeDecoder::Create(PatternSet pattern, const Reconstruc
                                                         config.dead_margin_fraction));
   decoder.config_ = config;
   decoder.pattern_ = std::move(pattern);
+  decoder.path_ = path.value_or(SimdPath::kBaseline);
+  if (path) {
+    decoder.packed_ =
+        PackedDecoder::Make({decoder.pattern_, config, decoder.estimator_, decoder.table_}, *path);
+  }
   return decoder;
+}
+
+std::vector<std::uint8_t> FringeDecoder::DecodeRows(std::span<const cv::Mat> frames,
+                                                    const ReconstructionConfig& config,
+                                                    DecodedView& view) const {
+  std::vector<std::uint8_t> doubtful(static_cast<std::size_t>(view.cause.rows));
+  const bool packed = packed_ && frames[0].depth() == CV_8U && view.cause.cols >= PackedDecoder::kMinWidthPx;
+  const int saturation_dn = static_cast<int>(std::ceil(config.saturation_fraction * kFullScaleDn));
+  ParallelRows(config.threads, view.cause.rows, [&](int begin, int end) {
+    const auto strip =
+        packed ? nullptr : std::make_unique<StripDecoder>(pattern_, config, estimator_, table_);
+    for (int row = begin; row < end; ++row) {
+      doubtful[static_cast<std::size_t>(row)] =
+          packed ? packed_->Row(frames, row, saturation_dn, view) : DecodeRow(frames, row, *strip, view);
+    }
+  });
+  return doubtful;
 }
 
 Result<DecodedView> FringeDecoder::Decode(std::span<const cv::Mat> frames) const {
   RETURN_IF_ERROR(CheckFrames(frames, pattern_.frame_count()));
-  const cv::Size size = frames[0].size();
-  DecodedView view = MakeView(size);
+  DecodedView view = pool_->Take(frames[0].size());
   ReconstructionConfig config = config_;
   if (const auto level = FindClippingLevel(frames, pattern_, config_.threads)) {
     const double clipping_dn = GreyScale(frames[0], config_) * *level;
@@ -120,22 +129,11 @@ Result<DecodedView> FringeDecoder::Decode(std::span<const cv::Mat> frames) const
       config.saturation_fraction = (1 - kRounding) * clipping_dn / kFullScaleDn;
     }
   }
-  ParallelRows(config_.threads, size.height, [&](int begin, int end) {
-    const auto strip = std::make_unique<StripDecoder>(pattern_, config, estimator_, table_);
-    for (int row = begin; row < end; ++row) {
-      for (int column = 0; column < size.width; column += StripDecoder::kLength) {
-        const int length = std::min(StripDecoder::kLength, size.width - column);
-        strip->Load(frames, row, column, length);
-        strip->Decode();
-        Store(*strip, row, column, length, view);
-      }
-    }
-  });
-  view.repaired = RepairFringeOrders(
-      view, pattern_.frequencies[static_cast<std::size_t>(table_.base)].period_px, config_);
-  DropMaskBorder(view, config_);
-  CountCauses(config_.threads, view);
-  TakeMedians(view);
+  const std::vector<std::uint8_t> doubtful = DecodeRows(frames, config, view);
+  const double period_px = pattern_.frequencies[static_cast<std::size_t>(table_.base)].period_px;
+  view.repaired = RepairFringeOrders(doubtful, period_px, config_, view);
+  DropMaskBorder(config_, path_, view);
+  TakeMedians(frames, *this, GreyScale(frames[0], config_), view);
   return view;
 }
 

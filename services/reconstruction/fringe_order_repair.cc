@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <opencv2/imgproc.hpp>
 #include <optional>
 #include <vector>
 
@@ -77,12 +76,15 @@ class RowRepair {
 
 }  // namespace
 
-long RepairFringeOrders(DecodedView& view, double period_px, const ReconstructionConfig& config) {
+long RepairFringeOrders(const std::vector<std::uint8_t>& doubtful_rows, double period_px,
+                        const ReconstructionConfig& config, DecodedView& view) {
   const RowRepair repair(view, period_px, config);
   std::vector<std::vector<Repair>> rows(static_cast<std::size_t>(view.cause.rows));
   ParallelRows(config.threads, view.cause.rows, [&](int begin, int end) {
     for (int row = begin; row < end; ++row) {
-      rows[static_cast<std::size_t>(row)] = repair.Row(row);
+      if (doubtful_rows[static_cast<std::size_t>(row)] != 0) {
+        rows[static_cast<std::size_t>(row)] = repair.Row(row);
+      }
     }
   });
   long count = 0;
@@ -94,17 +96,6 @@ long RepairFringeOrders(DecodedView& view, double period_px, const Reconstructio
     }
   }
   return count;
-}
-
-void DropMaskBorder(DecodedView& view, const ReconstructionConfig& config) {
-  if (config.mask_border_px == 0) {
-    return;
-  }
-  const int side = 2 * config.mask_border_px + 1;
-  const cv::Mat valid = view.cause == kValid;
-  cv::Mat kept;
-  cv::erode(valid, kept, cv::Mat::ones(side, side, CV_8U));
-  view.cause.setTo(static_cast<int>(MaskCause::kBorder), valid & ~kept);
 }
 
 }  // namespace forgescan

@@ -1,6 +1,9 @@
 // Second look at pixels whose fringe order was doubtful.
 #pragma once
 
+#include <cstdint>
+#include <vector>
+
 #include "services/reconstruction/decoded_view.h"
 #include "services/reconstruction/reconstruction_config.h"
 
@@ -8,11 +11,10 @@ namespace forgescan {
 
 // A pixel masked by kUnwrapMargin moves by whole periods to where the median of its valid neighbours (5 x 5)
 // is; it becomes valid if there are enough of them and it then comes near to it. Neighbours are taken as they
-// were before any repair, so the order of visits does not matter. period_px: of the finest frequency. Returns
-// the number of pixels made valid. See docs/design.md, "Fringe order" and "Masks and refusals".
-long RepairFringeOrders(DecodedView& view, double period_px, const ReconstructionConfig& config);
-
-// Masks by kBorder every valid pixel that has a masked one within config.mask_border_px (square window).
-void DropMaskBorder(DecodedView& view, const ReconstructionConfig& config);
+// were before any repair, so the order of visits does not matter. doubtful_rows: whether a row has such
+// pixels. period_px: of the finest frequency. Returns the number of pixels made valid. See docs/design.md,
+// "Fringe order" and "Masks and refusals".
+long RepairFringeOrders(const std::vector<std::uint8_t>& doubtful_rows, double period_px,
+                        const ReconstructionConfig& config, DecodedView& view);
 
 }  // namespace forgescan

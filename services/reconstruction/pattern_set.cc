@@ -86,11 +86,27 @@ Status ReadFrequencies(const toml::table& table, const std::string& name, Patter
   return {};
 }
 
+Status ReadReference(const toml::table& table, const std::string& name, PatternSet& pattern) {
+  ASSIGN_OR_RETURN(auto reference, Read<std::string>(table, "reference", name));
+  pattern.reference_frame_index = pattern.frame_count();
+  pattern.frame_names.push_back(std::move(reference));
+  if (!table.contains("reference_light")) {
+    return {};
+  }
+  ASSIGN_OR_RETURN(const auto light, Read<std::string>(table, "reference_light", name));
+  if (light != "white" && light != "mid_grey") {
+    return Fail(ErrorCode::kFormat, "{}: reference_light is \"{}\", allowed are \"white\" and \"mid_grey\"",
+                name, light);
+  }
+  pattern.reference_light = light == "white" ? ReferenceLight::kWhite : ReferenceLight::kMidGrey;
+  return {};
+}
+
 Result<PatternSet> ReadPatternSet(const toml::table& table, const std::string& name) {
-  RETURN_IF_ERROR(CheckKeys(
-      table,
-      {"projector_width_px", "phase_origin_px", "background", "reference", "reference_contrast", "frequency"},
-      name));
+  RETURN_IF_ERROR(CheckKeys(table,
+                            {"projector_width_px", "phase_origin_px", "background", "reference",
+                             "reference_light", "reference_contrast", "frequency"},
+                            name));
   PatternSet pattern;
   ASSIGN_OR_RETURN(pattern.projector_width_px, Read<int>(table, "projector_width_px", name));
   ASSIGN_OR_RETURN(pattern.phase_origin_px, ReadOr(table, "phase_origin_px", 0.0, name));
@@ -102,10 +118,8 @@ Result<PatternSet> ReadPatternSet(const toml::table& table, const std::string& n
   }
   pattern.background = background == "own" ? Background::kOwn : Background::kShared;
   RETURN_IF_ERROR(ReadFrequencies(table, name, pattern));
-  if (table.contains("reference")) {
-    ASSIGN_OR_RETURN(auto reference, Read<std::string>(table, "reference", name));
-    pattern.reference_frame_index = pattern.frame_count();
-    pattern.frame_names.push_back(std::move(reference));
+  if (table.contains("reference") || table.contains("reference_light")) {
+    RETURN_IF_ERROR(ReadReference(table, name, pattern));
   }
   return pattern;
 }

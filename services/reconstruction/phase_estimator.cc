@@ -8,10 +8,20 @@
 namespace forgescan {
 namespace {
 
-// Unknowns: the backgrounds first, then C and S of each frequency.
+bool ModelsDrift(const PatternSet& pattern) {
+  return pattern.background == Background::kShared && pattern.reference_frame_index &&
+         pattern.reference_light == ReferenceLight::kMidGrey;
+}
+
+Eigen::VectorXd Times(const PatternSet& pattern) {
+  return Eigen::VectorXd::LinSpaced(pattern.frame_count(), 0, pattern.frame_count() - 1);
+}
+
+// Unknowns: the backgrounds first, then C and S of each frequency, then the drift.
 Eigen::MatrixXd DesignMatrix(const PatternSet& pattern, int backgrounds) {
   const int frequencies = static_cast<int>(pattern.frequencies.size());
-  Eigen::MatrixXd design = Eigen::MatrixXd::Zero(pattern.frame_count(), backgrounds + 2 * frequencies);
+  Eigen::MatrixXd design = Eigen::MatrixXd::Zero(
+      pattern.frame_count(), backgrounds + 2 * frequencies + (ModelsDrift(pattern) ? 1 : 0));
   for (int j = 0; j < frequencies; ++j) {
     const FringeFrequency& frequency = pattern.frequencies[static_cast<std::size_t>(j)];
     for (std::size_t i = 0; i < frequency.frame_index.size(); ++i) {
@@ -21,7 +31,20 @@ Eigen::MatrixXd DesignMatrix(const PatternSet& pattern, int backgrounds) {
       design(frame, backgrounds + 2 * j + 1) = -std::sin(frequency.shift_rad[i]);
     }
   }
+  if (ModelsDrift(pattern)) {
+    design(*pattern.reference_frame_index, 0) = 1;
+    design.rightCols<1>() = Times(pattern).array() - Times(pattern).mean();
+  }
   return design;
+}
+
+std::vector<double> DriftGains(const PhaseEstimator& estimator, const PatternSet& pattern) {
+  std::vector<double> gains;
+  for (Eigen::Index j = 0; j < estimator.cosine.rows(); ++j) {
+    gains.push_back(
+        std::hypot(estimator.cosine.row(j).dot(Times(pattern)), estimator.sine.row(j).dot(Times(pattern))));
+  }
+  return gains;
 }
 
 std::vector<double> FusionWeights(const PhaseEstimator& estimator, const PatternSet& pattern) {
@@ -45,14 +68,19 @@ double PhaseEstimator::PhaseNoise(int frequency) const {
   return std::sqrt((cosine.row(frequency).squaredNorm() + sine.row(frequency).squaredNorm()) / 2);
 }
 
-double PhaseEstimator::WhiteNoise(int frequency, double contrast) const {
+double PhaseEstimator::PhaseVariance(int frequency, double phase_rad) const {
+  return (std::cos(phase_rad) * sine.row(frequency) - std::sin(phase_rad) * cosine.row(frequency))
+      .squaredNorm();
+}
+
+double PhaseEstimator::ReferenceNoise(int frequency, double per_modulation) const {
   constexpr int kPhases = 64;
   double worst = 0;
   for (int k = 0; k < kPhases; ++k) {
     const double phase = 2 * std::numbers::pi * k / kPhases;
     const Eigen::RowVectorXd modulation =
         std::cos(phase) * cosine.row(frequency) + std::sin(phase) * sine.row(frequency);
-    worst = std::max(worst, (background.row(frequency) + modulation / contrast).norm());
+    worst = std::max(worst, (background.row(frequency) + per_modulation * modulation).norm());
   }
   return worst;
 }
@@ -82,11 +110,15 @@ Result<PhaseEstimator> MakePhaseEstimator(const PatternSet& pattern) {
   }
   const Eigen::MatrixXd identity = Eigen::MatrixXd::Identity(pattern.frame_count(), pattern.frame_count());
   estimator.residual = identity - design * solution;
-  if (pattern.reference_frame_index) {
+  const bool has_other_frame = pattern.reference_frame_index && !ModelsDrift(pattern);
+  if (has_other_frame) {
     estimator.residual.row(*pattern.reference_frame_index).setZero();  // not part of the model
   }
-  const int fringe_frames = pattern.frame_count() - (pattern.reference_frame_index ? 1 : 0);
-  estimator.redundancy = fringe_frames - static_cast<int>(design.cols());
+  if (ModelsDrift(pattern)) {
+    estimator.drift = solution.bottomRows<1>();
+  }
+  estimator.redundancy = pattern.frame_count() - (has_other_frame ? 1 : 0) - static_cast<int>(design.cols());
+  estimator.drift_gain = DriftGains(estimator, pattern);
   estimator.fusion = FusionWeights(estimator, pattern);
   return estimator;
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <vector>
 
 #include "services/common/result.h"
@@ -9,6 +10,7 @@
 
 namespace forgescan {
 
+// Time is counted in frames, in the order of the view's frames.
 // Model: I_i = A + B_j cos(phi_j + shift_i) = A + C_j cos(shift_i) - S_j sin(shift_i), C = B cos(phi), S = B
 // sin(phi), with one A a frequency (own background) or one for all (shared). The solution is linear in the
 // frames: C_j = sum_i cosine(j,i) I_i. Source: PAPER 2.2.1, Eq. (1)-(4); for 4 own frames it is the classic
@@ -19,16 +21,27 @@ struct PhaseEstimator {
   Eigen::MatrixXd sine;
   Eigen::MatrixXd background;
   Eigen::MatrixXd residual;  // frames x frames: what the model leaves of the frames
-  int redundancy = 0;        // frames minus unknowns
+  // Drift of the background from one frame to the next, 1 x frames: only with a shared background and a
+  // mid-grey reference. Then A is a straight line in time, the reference is one more frame of it, and the
+  // phases are free of the drift.
+  std::optional<Eigen::RowVectorXd> drift;
+  // Largest error of each phase, rad, by a drift of one B a frame. Source: linear, C and S shift by what the
+  // drift puts there; for 3-2-2 frames 1.0, 3.6 and 6.4, for 2-3-2 frames 3.6, 1.0 and 3.6.
+  std::vector<double> drift_gain;
+  int redundancy = 0;  // frames minus unknowns
   std::vector<double>
       fusion;  // weights of the frequencies' coordinates, sum 1: best for phases of average variance
 
   // Standard deviation of a phase over sigma / B (sigma of a grey value), averaged over all phases: 0.71 for
   // 4 own frames, 1.0 and 1.22 for 3-2-2 shared ones.
   double PhaseNoise(int frequency) const;
-  // Standard deviation of A + B / contrast, what the reference frame should show, over sigma, at the worst
-  // phase.
-  double WhiteNoise(int frequency, double contrast) const;
+  // Variance of a phase at phase_rad over (sigma / B)^2: 1/2 for 4 own frames; 1 + cos(2 phi) / 2 and
+  // 1.5 + sin(2 phi) / 2 for the three-frame and the two-frame frequencies of a shared 3-2-2 set. To first
+  // order.
+  double PhaseVariance(int frequency, double phase_rad) const;
+  // Standard deviation of A + per_modulation B, what the reference frame should show, over sigma, at the
+  // worst phase.
+  double ReferenceNoise(int frequency, double per_modulation) const;
 };
 
 // Errors: kInvalidArgument from Check(pattern); kDegenerate when the shifts do not determine the phases.

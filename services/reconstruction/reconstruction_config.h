@@ -51,6 +51,9 @@ struct ReconstructionConfig {
       0.08;  // the frequencies disagree by more than this over the view (robust rms),
   double max_shared_second_harmonic =
       0.02;  // the projector's 2nd harmonic exceeds this and the background is shared,
+  double max_drift_phase_rad = 0.05;  // a drift of the background bends a phase by more than this at worst,
+                                      // and the background is shared; a contrast of the white frame that is 1
+                                      // % off looks like 0.01 rad,
   double max_saturated_fraction = 0.2;  // more than this part of the lit pixels is saturated,
   double max_median_projector_residual_px =
       0.2;                             // the projector disagrees by more than this: the calibration drifted,

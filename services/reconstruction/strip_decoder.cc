@@ -39,7 +39,8 @@ StripDecoder::StripDecoder(const PatternSet& pattern, const ReconstructionConfig
   const int frames = pattern.frame_count();
   frames_.resize(static_cast<std::size_t>(frames));
   terms_.resize(static_cast<std::size_t>(frames));
-  reference_noise_ = static_cast<float>(estimator.WhiteNoise(0, pattern.reference_contrast));
+  reference_noise_ = static_cast<float>(estimator.ReferenceNoise(0, pattern.ReferencePerModulation()));
+  models_drift_ = estimator.drift.has_value();
   constexpr double kZero = 1e-12;  // weights that are 0 but for rounding
   for (int j = 0; j < static_cast<int>(pattern.frequencies.size()); ++j) {
     const auto at = static_cast<std::size_t>(j);
@@ -73,7 +74,7 @@ void StripDecoder::Load(std::span<const cv::Mat> frames, int row, int column, in
     } else {
       LoadLane<std::uint16_t>(frames[i], row, column, lane, scale);
     }
-    if (pattern_.reference_frame_index == static_cast<int>(i)) {
+    if (pattern_.reference_frame_index == static_cast<int>(i) && !models_drift_) {
       continue;  // plain white may saturate without harm to the phases; its own check follows
     }
     for (int x = 0; x < length; ++x) {
@@ -262,11 +263,11 @@ void StripDecoder::ClassifyRatios() {
 
 void StripDecoder::ClassifyReference() {
   const int length = length_;  // a local bound, which no store through a member can change
-  if (!pattern_.reference_frame_index) {
+  if (!pattern_.reference_frame_index || models_drift_) {
     return;
   }
   const Lane& white = frames_[static_cast<std::size_t>(*pattern_.reference_frame_index)];
-  const auto per_modulation = static_cast<float>(1 / pattern_.reference_contrast);
+  const auto per_modulation = static_cast<float>(pattern_.ReferencePerModulation());
   const auto sigmas = static_cast<float>(config_.reference_tolerance_sigma);
   const auto part = static_cast<float>(config_.reference_tolerance_modulation);
   const auto read_variance = static_cast<float>(config_.noise.read_noise_dn * config_.noise.read_noise_dn);

@@ -66,6 +66,7 @@ class StripDecoder {
   std::array<float, kMaxFrequencies> fusion_{};
   std::array<float, kMaxFrequencies> phase_noise_{};  // phase sigma over sigma / B
   float reference_noise_ = 0;                         // sigma of A + B / contrast over that of a grey value
+  bool models_drift_ = false;                         // the reference is part of the model, not a check of it
   int length_ = 0;
 
   std::vector<Lane> frames_;  // grey values, 8-bit DN

@@ -1,12 +1,14 @@
 #include "services/reconstruction/trust.h"
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 #include <complex>
 #include <numbers>
 #include <vector>
 
 #include "services/reconstruction/histogram_median.h"
+#include "services/reconstruction/pixel_sampler.h"
 
 namespace forgescan {
 namespace {
@@ -52,6 +54,26 @@ double SquaredDisagreement(const FringeOrderTable& table, const Eigen::VectorXd&
   return sum / table.other_count;
 }
 
+double TurnsOf(const std::complex<double>& phasor) { return std::arg(phasor) / (2 * std::numbers::pi); }
+
+// Rms difference of the other frequencies from the finest one, whose fringe order is that of the coordinate.
+double DisagreementRad(const FringeDecoder& decoder, const std::vector<std::complex<double>>& phasors,
+                       double coordinate_px) {
+  const FringeOrderTable& table = decoder.table();
+  const auto base = static_cast<std::size_t>(table.base);
+  const double turns = TurnsOf(phasors[base]);
+  const double position =
+      (coordinate_px - decoder.pattern().phase_origin_px) / decoder.pattern().frequencies[base].period_px;
+  const double unwrapped = std::round(position - turns) + turns;
+  double sum = 0;
+  for (std::size_t o = 0; o < static_cast<std::size_t>(table.other_count); ++o) {
+    const double off = static_cast<double>(table.ratios[o]) * unwrapped -
+                       TurnsOf(phasors[static_cast<std::size_t>(table.others[o])]);
+    sum += std::pow(off - std::round(off), 2);
+  }
+  return 2 * std::numbers::pi * std::sqrt(sum / table.other_count);
+}
+
 // Rms disagreement per unit of 2nd harmonic ratio, averaged over all phases; 0 where the frames cancel it.
 double HarmonicGain(const FringeDecoder& decoder) {
   constexpr int kSteps = 8;
@@ -80,19 +102,20 @@ class TrustSampler {
  public:
   TrustSampler(std::span<const cv::Mat> frames, const FringeDecoder& decoder,
                const ReconstructionConfig& config)
-      : frames_(frames), decoder_(decoder), noise_(config.noise), scale_(GreyScale(frames[0], config)) {}
+      : pixel_(frames, decoder.estimator(), GreyScale(frames[0], config)),
+        decoder_(decoder),
+        noise_(config.noise),
+        errors_(decoder.estimator().cosine.rows()) {}
 
   void AddSaturated() { ++saturated_; }
 
-  void Add(int row, int column, double disagreement_rad) {
-    const Eigen::VectorXd grey = Grey(row, column);
+  void Add(int row, int column, double coordinate_px) {
+    const Eigen::VectorXd& grey = pixel_.Grey(row, column);
     const PhaseEstimator& estimator = decoder_.estimator();
-    std::vector<std::complex<double>> phasors;
-    for (Eigen::Index j = 0; j < estimator.cosine.rows(); ++j) {
-      phasors.emplace_back(estimator.cosine.row(j).dot(grey), estimator.sine.row(j).dot(grey));
-    }
-    disagreement_.Add(disagreement_rad);
+    const std::vector<std::complex<double>>& phasors = pixel_.Phasors(row, column);
+    disagreement_.Add(DisagreementRad(decoder_, phasors, coordinate_px));
     predicted_square_ += PredictedSquare(grey, phasors);
+    AddDrift(grey, phasors);
     ++lit_;
     if (estimator.redundancy > 0) {
       AddResidual(estimator.residual * grey, phasors);
@@ -109,28 +132,51 @@ class TrustSampler {
     figures.predicted_disagreement_rad = std::sqrt(predicted_square_ / static_cast<double>(lit_));
     figures.saturated_fraction = static_cast<double>(saturated_) / static_cast<double>(saturated_ + lit_);
     FinishHarmonic(figures);
+    if (drift_ratio_.total() > 0) {
+      const auto& gains = decoder_.estimator().drift_gain;
+      figures.drift_dn = drift_dn_.Median();
+      figures.drift_phase_rad =
+          std::abs(drift_ratio_.Median()) * *std::max_element(gains.begin(), gains.end());
+    }
     return figures;
   }
 
  private:
-  Eigen::VectorXd Grey(int row, int column) const {
-    Eigen::VectorXd grey(static_cast<Eigen::Index>(frames_.size()));
-    for (std::size_t i = 0; i < frames_.size(); ++i) {
-      const cv::Mat& frame = frames_[i];
-      grey(static_cast<Eigen::Index>(i)) =
-          scale_ * (frame.depth() == CV_8U ? frame.at<std::uint8_t>(row, column)
-                                           : frame.at<std::uint16_t>(row, column));
+  // The reference shows the background at its own time, the fringes at theirs.
+  void AddDrift(const Eigen::VectorXd& grey, const std::vector<std::complex<double>>& phasors) {
+    constexpr double kUncut = 250;  // DN: a brighter reference may be saturated
+    const PatternSet& pattern = decoder_.pattern();
+    const PhaseEstimator& estimator = decoder_.estimator();
+    if (!pattern.reference_frame_index || grey(*pattern.reference_frame_index) > kUncut) {
+      return;
     }
-    return grey;
+    const double modulation = std::abs(phasors[0]);
+    double drift = 0;
+    if (estimator.drift) {
+      drift = estimator.drift->dot(grey);
+    } else {
+      const double level =
+          estimator.background.row(0).dot(grey) + pattern.ReferencePerModulation() * modulation;
+      const auto times = Eigen::VectorXd::LinSpaced(grey.size(), 0, static_cast<double>(grey.size() - 1));
+      drift = (grey(*pattern.reference_frame_index) - level) /
+              (*pattern.reference_frame_index - estimator.background.row(0).dot(times));
+    }
+    drift_dn_.Add(drift);
+    drift_ratio_.Add(drift / modulation);
   }
 
+  // Without a matrix of its own: it is done for every sample.
   double PredictedSquare(const Eigen::VectorXd& grey,
-                         const std::vector<std::complex<double>>& phasors) const {
+                         const std::vector<std::complex<double>>& phasors) {
+    const PhaseEstimator& estimator = decoder_.estimator();
     double sum = 0;
     for (Eigen::Index i = 0; i < grey.size(); ++i) {
-      const double sigma = std::sqrt(noise_.read_noise_dn * noise_.read_noise_dn + noise_.gain_dn * grey(i));
-      const Eigen::VectorXd change = sigma * Eigen::VectorXd::Unit(grey.size(), i);
-      sum += SquaredDisagreement(decoder_.table(), PhaseErrors(decoder_.estimator(), phasors, change));
+      for (Eigen::Index j = 0; j < errors_.size(); ++j) {
+        const std::complex<double>& p = phasors[static_cast<std::size_t>(j)];
+        errors_(j) = (p.real() * estimator.sine(j, i) - p.imag() * estimator.cosine(j, i)) / std::norm(p);
+      }
+      const double variance = noise_.read_noise_dn * noise_.read_noise_dn + noise_.gain_dn * grey(i);
+      sum += variance * SquaredDisagreement(decoder_.table(), errors_);
     }
     return sum;
   }
@@ -164,11 +210,13 @@ class TrustSampler {
     figures.noise_dn = std::sqrt(std::max(residual_square_ - explained, 0.0) / freedom);
   }
 
-  std::span<const cv::Mat> frames_;
+  PixelSampler pixel_;
   const FringeDecoder& decoder_;
   CameraNoise noise_;
-  double scale_;
+  Eigen::VectorXd errors_;  // of the phases, scratch
   HistogramMedian disagreement_{0, 4, 40000};
+  HistogramMedian drift_dn_{-32, 32, 32000};
+  HistogramMedian drift_ratio_{-0.5, 0.5, 20000};
   long lit_ = 0;
   long saturated_ = 0;
   double predicted_square_ = 0;
@@ -186,9 +234,7 @@ bool IsLit(MaskCause cause) {
 
 Result<TrustFigures> MeasureTrust(std::span<const cv::Mat> frames, const DecodedView& view,
                                   const FringeDecoder& decoder, const ReconstructionConfig& config) {
-  constexpr double kSamples = 20000;
-  const int step =
-      std::max(1, static_cast<int>(std::sqrt(static_cast<double>(view.cause.total()) / kSamples)));
+  const int step = SamplingStep(view.cause.size());
   TrustSampler sampler(frames, decoder, config);
   for (int row = step / 2; row < view.cause.rows; row += step) {
     for (int column = step / 2; column < view.cause.cols; column += step) {
@@ -196,7 +242,7 @@ Result<TrustFigures> MeasureTrust(std::span<const cv::Mat> frames, const Decoded
       if (cause == MaskCause::kSaturated) {
         sampler.AddSaturated();
       } else if (IsLit(cause)) {
-        sampler.Add(row, column, static_cast<double>(view.disagreement_rad(row, column)));
+        sampler.Add(row, column, static_cast<double>(view.coordinate_px(row, column)));
       }
     }
   }
@@ -225,6 +271,13 @@ Status JudgeTrust(const TrustFigures& figures, const FringeDecoder& decoder,
                 shared ? "this projector is not linear enough for a shared background, or a frame is not "
                          "what the pattern set says"
                        : "a frame is not what the pattern set says, or the scene moved");
+  }
+  if (shared && figures.drift_phase_rad && *figures.drift_phase_rad > config.max_drift_phase_rad) {
+    return Fail(ErrorCode::kUntrusted,
+                "the background of the {} camera drifts by {:.2f} grey values a frame, which bends the "
+                "phases by up to {:.3f} "
+                "rad, limit {:.3f}: too much for a shared background",
+                camera, *figures.drift_dn, *figures.drift_phase_rad, config.max_drift_phase_rad);
   }
   const auto harmonic =
       figures.second_harmonic_ratio ? figures.second_harmonic_ratio : figures.suspected_second_harmonic;

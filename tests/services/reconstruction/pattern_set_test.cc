@@ -51,6 +51,9 @@ TEST(PatternSet, EveryWrongEntryIsNamed) {
       {"shifts_deg = [0, 90]", "shifts_deg = [0, 90, 180]", "2 frames but 3 shifts_deg"},
       {"shifts_deg = [0, 90]", "shifts_deg = [0, inf]", "a shift is inf"},
       {"shifts_deg = [0, 90]", "shifts_deg = [0, \"x\"]", "entry 2 of shifts_deg"},
+      {"reference = \"white.png\"", "reference_light = \"white\"", "reference is missing"},
+      {"reference = \"white.png\"", "reference = \"w.png\"\nreference_light = \"grey\"",
+       "reference_light is \"grey\""},
       {"\"5.png\"", "\"1.png\"", "each must be used exactly once"},
       {"[[frequency]]", "[[frequency]", "line"},
   };

@@ -40,8 +40,8 @@ TEST(PhaseEstimator, FourOwnFramesAreTheClassicArctan) {
   EXPECT_NEAR(Phase(*estimator, 0, grey), std::atan2(170 - 60, 131 - 88), 1e-12);
   EXPECT_NEAR(Phase(*estimator, 1, grey), std::atan2(33 - 220, 20 - 90), 1e-12);
   EXPECT_EQ(estimator->redundancy, 2);
-  EXPECT_NEAR(estimator->PhaseNoise(0), std::sqrt(0.5), 1e-12);      // variance sigma^2 / (2 B^2)
-  EXPECT_NEAR(estimator->WhiteNoise(0, 1), std::sqrt(0.75), 1e-12);  // A: 1/4, B: 1/2, independent
+  EXPECT_NEAR(estimator->PhaseNoise(0), std::sqrt(0.5), 1e-12);          // variance sigma^2 / (2 B^2)
+  EXPECT_NEAR(estimator->ReferenceNoise(0, 1), std::sqrt(0.75), 1e-12);  // A: 1/4, B: 1/2, independent
 }
 
 // Eq. (2)-(4) of the paper with delta_i = 2 pi (i - 1) / 4.

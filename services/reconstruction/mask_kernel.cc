@@ -1,0 +1,77 @@
+#include "services/reconstruction/mask_kernel.h"
+
+#include <cstddef>
+
+namespace forgescan {
+namespace {
+
+using In = std::span<const std::uint8_t>;
+using Out = std::span<std::uint8_t>;
+
+[[gnu::always_inline]] inline void JoinBytes(const std::uint8_t* from, std::uint8_t* __restrict to,
+                                             std::size_t length) {
+  for (std::size_t x = 0; x < length; ++x) {
+    to[x] = static_cast<std::uint8_t>(to[x] | from[x]);
+  }
+}
+
+[[gnu::always_inline]] inline void WidenBytes(In in, int reach, Out out) {
+  const std::size_t length = out.size();
+  const std::uint8_t* const from = in.data();
+  std::uint8_t* const __restrict to = out.data();
+  if (reach == 4) {  // two px each side: the usual border, in one go
+    for (std::size_t x = 0; x < length; ++x) {
+      to[x] = static_cast<std::uint8_t>(from[x] | from[x + 1] | from[x + 2] | from[x + 3] | from[x + 4]);
+    }
+    return;
+  }
+  for (std::size_t x = 0; x < length; ++x) {
+    to[x] = from[x];
+  }
+  for (int shift = 1; shift <= reach; ++shift) {
+    JoinBytes(from + shift, to, length);
+  }
+}
+
+[[gnu::always_inline]] inline void MarkBytes(In near, std::uint8_t border, Out cause) {
+  const std::size_t length = cause.size();
+  const std::uint8_t* const from = near.data();
+  std::uint8_t* const __restrict to = cause.data();
+  for (std::size_t x = 0; x < length; ++x) {
+    const std::uint8_t marked = from[x] != 0 ? border : std::uint8_t{0};
+    to[x] = to[x] != 0 ? to[x] : marked;
+  }
+}
+
+void WidenPlain(In in, int reach, Out out) { WidenBytes(in, reach, out); }
+void JoinPlain(In from, Out to) { JoinBytes(from.data(), to.data(), to.size()); }
+void MarkPlain(In near, std::uint8_t border, Out cause) { MarkBytes(near, border, cause); }
+
+#if defined(__x86_64__)
+#define FORGESCAN_AVX2 [[gnu::target("avx2,prefer-vector-width=256")]]
+#define FORGESCAN_AVX512 [[gnu::target("avx512f,avx512bw,avx512vl,avx512dq,prefer-vector-width=512")]]
+FORGESCAN_AVX2 void WidenAvx2(In in, int reach, Out out) { WidenBytes(in, reach, out); }
+FORGESCAN_AVX2 void JoinAvx2(In from, Out to) { JoinBytes(from.data(), to.data(), to.size()); }
+FORGESCAN_AVX2 void MarkAvx2(In near, std::uint8_t border, Out cause) { MarkBytes(near, border, cause); }
+FORGESCAN_AVX512 void WidenAvx512(In in, int reach, Out out) { WidenBytes(in, reach, out); }
+FORGESCAN_AVX512 void JoinAvx512(In from, Out to) { JoinBytes(from.data(), to.data(), to.size()); }
+FORGESCAN_AVX512 void MarkAvx512(In near, std::uint8_t border, Out cause) { MarkBytes(near, border, cause); }
+#endif
+
+}  // namespace
+
+MaskKernel::MaskKernel(SimdPath path) : widen_(&WidenPlain), join_(&JoinPlain), mark_(&MarkPlain) {
+#if defined(__x86_64__)
+  if (path == SimdPath::kAvx2) {
+    widen_ = &WidenAvx2;
+    join_ = &JoinAvx2;
+    mark_ = &MarkAvx2;
+  } else if (path == SimdPath::kAvx512) {
+    widen_ = &WidenAvx512;
+    join_ = &JoinAvx512;
+    mark_ = &MarkAvx512;
+  }
+#endif
+}
+
+}  // namespace forgescan

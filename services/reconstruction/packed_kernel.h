@@ -1,0 +1,82 @@
+// The arithmetic of the shared 3-2-2 set on 8-bit frames in packed 16-bit lanes, for each kind of vector
+// instructions.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "services/reconstruction/simd_path.h"
+
+namespace forgescan {
+
+// A limit that grows with the noise of light: base + per_level / 2^9 for each unit of 2 A, DN.
+struct PackedLimit {
+  std::uint16_t base = 0;
+  std::uint16_t per_level = 0;
+};
+
+// Eq. (4) of the paper as whole numbers: 2 A = I11 + I13, 2 C1 = I11 - I13, 2 S1 = 2 A - 2 I12, 2 Cj = 2 Ij1
+// - 2 A, 2 Sj = 2 A - 2 Ij2. Slot 0 is the frequency with three frames. Units: a phase is 2^-16 turn, a
+// modulation or contrast 1/64 DN. A phase is within 1.5e-4 rad of the exact one, a hundredth of the noise of
+// good light; a modulation within 1/5000 and 1/32 DN.
+struct PackedConstants {
+  std::array<int, 3> slot{};  // of the finest frequency and of the other two
+  int first_slot = 0;         // of the pattern's first frequency, which ratios and reference refer to
+  bool has_reference = false;
+
+  const std::uint32_t* cells = nullptr;        // 512 x 512: fringe order less the first one; bit 15: doubtful
+  std::array<std::uint16_t, 2> ratio_high{};   // of the others' periods, 2^-16
+  std::array<std::uint16_t, 2> ratio_low{};    // 2^-32
+  std::array<std::uint16_t, 2> first_turns{};  // code of the first order
+  float period_px = 0;                         // finest period, over 2^16
+  float first_order_px = 0;                    // where the first order begins
+  std::array<float, 2> gain_px{};      // px of the coordinate per 2^-16 turn of the others' disagreement
+  std::uint16_t max_disagreement = 0;  // half the sum of the squares, 2^-16 turn^2 / 4
+  float first_px = 0;
+  float last_px = 0;
+
+  std::uint8_t saturation_dn = 255;
+  std::uint16_t min_modulation = 0;
+  PackedLimit low_limit;                     // of the least modulation, squared, >> 8
+  PackedLimit noise_limit;                   // of the least modulation scaled by quietness, squared, >> 12
+  PackedLimit ratio_limit;                   // of the excess of a ratio, squared, >> 8
+  std::array<std::uint16_t, 3> quietness{};  // 2^-16: least phase noise of the slots over this slot's
+  std::array<std::uint16_t, 3> ratio{};      // 2^-15: modulation over the first slot's
+  std::uint16_t ratio_tolerance = 0;         // 2^-16
+
+  std::uint16_t reference_per_modulation = 0;  // 2^-15
+  std::uint16_t reference_tolerance = 0;       // 2^-16 of the modulation
+  PackedLimit white_limit;                     // of what the reference is off, squared, >> 8
+  std::uint16_t white_limit_per_white = 0;     // 2^-14, per 1/64 DN expected
+
+  std::array<std::int16_t, 3> influence{};  // 2^-15: of a slot's phase on the coordinate, scaled to 1 in all
+  float sigma_scale_px = 0;
+  float read_variance = 0;                    // DN^2
+  float lit_variance = 0;                     // DN^2 per 256 DN
+  std::array<std::uint16_t, 3> mean_ratio{};  // 2^-16: brings the slots' modulations to a mean one
+};
+
+struct PackedStrip {
+  std::array<const std::uint8_t*, 8> frames{};  // I11 I12 I13 I21 I22 I31 I32 and the reference, or nothing
+  int length = 0;                               // px: a multiple of 32, at most kMaxLength
+  float* coordinate_px = nullptr;
+  float* sigma_px = nullptr;
+  std::uint8_t* cause = nullptr;
+};
+
+class PackedKernel {
+ public:
+  static constexpr int kMaxLength = 512;
+
+  explicit PackedKernel(SimdPath path);
+
+  // Whether any pixel is masked because its fringe order is doubtful.
+  bool Decode(const PackedConstants& constants, const PackedStrip& strip) const {
+    return run_(constants, strip);
+  }
+
+ private:
+  bool (*run_)(const PackedConstants&, const PackedStrip&);
+};
+
+}  // namespace forgescan
