@@ -1,0 +1,132 @@
+// A sampled row made ready for the search. See kernel.h.
+#pragma once
+
+#include "services/reconstruction/stereo/kernel.h"
+#include "services/reconstruction/stereo/lanes.h"
+
+namespace forgescan {
+namespace {
+
+FORGESCAN_INLINE Mask IsStep(Floats step, SlopeLimits limits) {
+  return LessEqual(All(limits.low), step) & LessEqual(step, All(limits.high));
+}
+
+// Least squares by a parabola over five pixels of one surface (Savitzky and Golay, Anal. Chem. 36 (1964)
+// 1627): no bias up to the third derivative, 17/35 of the variance. Where one of the five is missing the
+// pixel stays as it is.
+FORGESCAN_INLINE void SmoothBlock(int x, SlopeLimits limits, const StereoRow& row) {
+  const float* const raw = row.raw_px + x;
+  const Floats center = Load(raw), left = Load(raw - 1), right = Load(raw + 1);
+  const Floats far_left = Load(raw - 2), far_right = Load(raw + 2);
+  const Mask smooth = IsStep(left - far_left, limits) & IsStep(center - left, limits) &
+                      IsStep(right - center, limits) & IsStep(far_right - right, limits);
+  const Floats near_bend = (left - center) + (right - center);
+  const Floats far_bend = (far_left - center) + (far_right - center);
+  const Floats variance = Load(row.variance_px2 + x);
+  Store(row.coordinate_px + x,
+        Select(smooth, center + (12.0F / 35 * near_bend - 3.0F / 35 * far_bend), center));
+  Store(row.variance_px2 + x, Select(smooth, 17.0F / 35 * variance, variance));
+}
+
+// Splits a row into segments of ascending coordinates while it is read from left to right.
+class Segmenter {
+ public:
+  explicit Segmenter(StereoRow& row) : row_(row) {
+    row_.segment_count = 0;
+    Begin(0);
+  }
+
+  // pairs: of the block; in_pair: the lanes that belong to a pair with either neighbour. Others are no part
+  // of any surface.
+  void AddBlock(int x, unsigned pairs, unsigned in_pair) {
+    const Floats coordinate = Load(row_.coordinate_px + x);
+    float* const ranks = row_.ranks + x + shift_;
+    if (in_pair == 0) {
+      Store(ranks, All(last_));
+    } else if ((pairs & 0x7fff) == 0x7fff && row_.coordinate_px[x] > last_) {
+      Note(row_.coordinate_px[x]);
+      Store(ranks, coordinate);
+      last_ = row_.coordinate_px[x + kLanes - 1];
+    } else {
+      for (int i = 0; i < kLanes; ++i) {
+        AddPixel(x + i, (in_pair >> i & 1) != 0);
+      }
+    }
+  }
+
+  void Finish(int end) {
+    End(end);
+    row_.segment_count += 1;
+  }
+
+ private:
+  static constexpr float kInfinity = __builtin_inff();
+
+  void AddPixel(int x, bool in_pair) {
+    const float coordinate = row_.coordinate_px[x];
+    if (in_pair && coordinate <= last_) {
+      End(x);
+      if (row_.segment_count < kMaxSegments - 1) {
+        row_.segment_count += 1;
+        Begin(x);
+      } else {
+        is_full_ = true;
+      }
+    }
+    if (in_pair) {
+      Note(coordinate);
+      last_ = coordinate;
+    }
+    row_.ranks[x + shift_] = last_;
+  }
+  void Note(float coordinate) {
+    RowSegment& segment = row_.segments[row_.segment_count];
+    segment.low = segment.low == kInfinity ? coordinate : segment.low;
+  }
+  void Begin(int x) {
+    shift_ = row_.segment_count * kSegmentMargin;
+    row_.segments[row_.segment_count] = {
+        .begin = x, .end = x, .ranks = x + shift_, .low = kInfinity, .high = -kInfinity};
+    last_ = -kInfinity;
+  }
+  void End(int x) {
+    RowSegment& segment = row_.segments[row_.segment_count];
+    segment.end = x;
+    segment.high = last_;
+    for (int i = 0; i < kSegmentMargin; ++i) {
+      row_.ranks[x + shift_ + i] = kInfinity;
+    }
+  }
+
+ public:
+  bool is_full() const { return is_full_; }
+
+ private:
+  StereoRow& row_;
+  float last_ = 0;
+  int shift_ = 0;
+  bool is_full_ = false;
+};
+
+inline void PrepareRow(int blocks, SlopeLimits limits, StereoRow& row) {
+  for (int block = 0; block < blocks; ++block) {
+    SmoothBlock(block * kLanes, limits, row);
+  }
+  Segmenter segmenter(row);
+  unsigned before = 0;
+  for (int block = 0; block < blocks; ++block) {
+    const int x = block * kLanes;
+    const Floats step = Load(row.coordinate_px + x + 1) - Load(row.coordinate_px + x);
+    const Mask is_pair = IsStep(step, limits);
+    Store(row.inverse_step + x, Select(is_pair, 1 / step, All(__builtin_nanf(""))));
+    const unsigned pairs = Bits(is_pair);
+    row.pair_bits[block] = static_cast<std::uint16_t>(pairs);
+    segmenter.AddBlock(x, pairs, (pairs | pairs << 1 | before) & 0xffff);
+    before = pairs >> 15;
+  }
+  segmenter.Finish(blocks * kLanes);
+  row.segment_count = segmenter.is_full() ? kMaxSegments + 1 : row.segment_count;
+}
+
+}  // namespace
+}  // namespace forgescan
