@@ -73,8 +73,9 @@ RawView ViewOf(const DecodedView& view, double slope, const ReconstructionConfig
 }
 
 SlopeLimits LimitsOf(double slope, const ReconstructionConfig& config) {
-  return {static_cast<float>(config.min_slope_ratio * std::abs(slope)),
-          static_cast<float>(config.max_slope_ratio * std::abs(slope))};
+  return {.low = static_cast<float>(config.min_slope_ratio * std::abs(slope)),
+          .high = static_cast<float>(config.max_slope_ratio * std::abs(slope)),
+          .max_off_px = static_cast<float>(config.max_left_right_px * std::abs(slope))};
 }
 
 std::vector<LitPoint> Thinned(const std::vector<LitPoint>& sample) {

@@ -14,8 +14,9 @@
 namespace forgescan {
 
 struct StereoCounts {
-  long candidates =
-      0;  // left pixels with a coordinate on an epipolar line; the following ones lost it, in this order
+  // Left pixels with a coordinate on an epipolar line that fits their neighbours'; the following ones lost
+  // it, in this order.
+  long candidates = 0;
   long no_partner = 0;
   long ambiguous = 0;    // more than one place fits, or the coordinate occurs twice in the left row
   long left_right = 0;   // there and back does not close

@@ -24,7 +24,7 @@ class Strip {
         hints_(static_cast<std::size_t>(blocks_)),
         points_(static_cast<std::size_t>((kPointFloats * (blocks_ + 1)) * kStereoLanes)) {
     if (task.rig.projector) {
-      check_.emplace(*task.rig.projector, task.config);
+      projector_ = MakeProjectorModel(*task.rig.projector, task.config);
     }
     result_.cloud_in_camera = std::move(cloud);
     result_.cloud_in_camera.points.clear();
@@ -51,9 +51,10 @@ class Strip {
   }
 
  private:
-  static constexpr int kKept = 5;         // arrays of a row that its neighbours or its points need later
-  static constexpr int kScratch = 6;      // of the right row; window sums; a row of nothing
-  static constexpr int kPointFloats = 9;  // of a PointRow
+  static constexpr int kKept = 5;          // arrays of a row that its neighbours or its points need later
+  static constexpr int kScratch = 6;       // of the right row; window sums; a row of nothing
+  static constexpr int kResidualStep = 8;  // every eighth is plenty for a median
+  static constexpr int kPointFloats = 9;   // of a PointRow
 
   float* Kept(int row, int array) { return kept_[(row % window_) * kKept + array]; }
   DisparityRow Disparity(int row) { return {Kept(row, 3), Kept(row, 4)}; }
@@ -90,7 +91,9 @@ class Strip {
             .max_depth_mm = static_cast<float>(config.max_depth_mm),
             .squared_min_cosine = static_cast<float>(std::pow(std::cos(angle), 2)),
             .max_slope_per_disparity = static_cast<float>(std::tan(angle) / rig.focal_px),
-            .radius_px = radius_};
+            .radius_px = radius_,
+            .sign = task_.left.sign,
+            .projector = projector_ ? &*projector_ : nullptr};
   }
 
   PointRow EmptyRow() {
@@ -100,11 +103,13 @@ class Strip {
             .normals = at + 3 * room,
             .sigma_mm = at + 6 * room,
             .coordinate_px = at + 7 * room,
-            .coordinate_variance_px2 = at + 8 * room,
+            .residual_px = at + 8 * room,
             .count = 0,
+            .residual_count = 0,
             .depth_range = 0,
             .no_normal = 0,
-            .steep = 0};
+            .steep = 0,
+            .projector = 0};
   }
 
   void AddPoints(int row) {
@@ -130,9 +135,6 @@ class Strip {
                               .moments = scratch_[4],
                               .blocks = blocks_},
                              Geometry(row), points);
-    if (check_) {
-      result_.count.projector += check_->Filter(points, result_.projector_residuals_px);
-    }
     Append(row, points);
   }
 
@@ -140,17 +142,12 @@ class Strip {
     PointCloud& cloud = result_.cloud_in_camera;
     const auto* const p = reinterpret_cast<const Eigen::Vector3f*>(points.points_mm);
     const auto* const n = reinterpret_cast<const Eigen::Vector3f*>(points.normals);
-    const int step = task_.config.keep_every_nth_point;
-    if (step == 1) {
+    if (task_.config.keep_every_nth_point == 1) {
       cloud.points.insert(cloud.points.end(), p, p + points.count);
       cloud.normals.insert(cloud.normals.end(), n, n + points.count);
       cloud.sigma_mm.insert(cloud.sigma_mm.end(), points.sigma_mm, points.sigma_mm + points.count);
     } else {
-      for (int i = 5 * row % step; i < points.count; i += step) {
-        cloud.points.push_back(p[i]);
-        cloud.normals.push_back(n[i]);
-        cloud.sigma_mm.push_back(points.sigma_mm[i]);
-      }
+      AppendThinned(row, points);
     }
     for (int i = 37 * row % task_.sample_step; i < points.count; i += task_.sample_step) {
       result_.sample.push_back({p[i], task_.left.sign * points.coordinate_px[i]});
@@ -159,6 +156,29 @@ class Strip {
     result_.count.depth_range += points.depth_range;
     result_.count.no_normal += points.no_normal;
     result_.count.steep += points.steep;
+    result_.count.projector += points.projector;
+    for (int i = row % kResidualStep; i < points.residual_count; i += kResidualStep) {
+      const auto residual_px = static_cast<double>(points.residual_px[i]);
+      result_.projector_residuals_px.Add(std::isnan(residual_px) ? kMaxResidualPx : residual_px);
+    }
+  }
+
+  void AppendThinned(int row, const PointRow& points) {
+    PointCloud& cloud = result_.cloud_in_camera;
+    const int step = task_.config.keep_every_nth_point;
+    const int first = 5 * row % step;
+    const int kept = points.count > first ? (points.count - first - 1) / step + 1 : 0;
+    const std::size_t size = cloud.points.size();
+    cloud.points.resize(size + static_cast<std::size_t>(kept));
+    cloud.normals.resize(cloud.points.size());
+    cloud.sigma_mm.resize(cloud.points.size());
+    for (int i = 0; i < kept; ++i) {
+      const int from = first + i * step;
+      const std::size_t to = size + static_cast<std::size_t>(i);
+      cloud.points[to] = Eigen::Map<const Eigen::Vector3f>(points.points_mm + 3 * from);
+      cloud.normals[to] = Eigen::Map<const Eigen::Vector3f>(points.normals + 3 * from);
+      cloud.sigma_mm[to] = points.sigma_mm[from];
+    }
   }
 
   const StereoTask& task_;
@@ -167,7 +187,7 @@ class Strip {
   PreparedRow left_, right_;
   std::vector<int> hints_;
   std::vector<float> points_;
-  std::optional<ProjectorCheck> check_;
+  std::optional<ProjectorModel> projector_;
   StripResult result_;
 };
 

@@ -5,11 +5,13 @@
 
 #include "services/common/geometry/point_cloud.h"
 #include "services/reconstruction/histogram_median.h"
-#include "services/reconstruction/projector_check.h"
+#include "services/reconstruction/projector_model.h"
 #include "services/reconstruction/stereo/kernel.h"
 #include "services/reconstruction/stereo_points.h"
 
 namespace forgescan {
+
+constexpr double kMaxResidualPx = 64;  // larger ones count as this in a median
 
 // What all strips of a pair of views share.
 struct StereoTask {

@@ -48,14 +48,16 @@ struct StereoRow {
   float* variance_px2;
   float* column_px;     // rectified, from the principal point
   float* inverse_step;  // 1 / (coordinate[x + 1] - coordinate[x]); NaN unless x and x + 1 are one surface
-  float* ranks;         // coordinates of the segments, gaps filled from the left, +inf behind each
+  float* pair_variance_px2;  // the larger one of x and x + 1
+  float* ranks;              // coordinates of the segments, gaps filled from the left, +inf behind each
   std::uint16_t* pair_bits;  // of each block: x and x + 1 are one surface
   RowSegment* segments;      // kMaxSegments
   int segment_count;         // kMaxSegments + 1: too many
 };
 
 struct SlopeLimits {
-  float low, high;  // projector px per camera px, both > 0
+  float low, high;   // projector px per camera px, both > 0
+  float max_off_px;  // of a pixel from the parabola through it and its neighbours
 };
 
 struct MatchCounts {
@@ -68,11 +70,23 @@ struct DisparityRow {
   float* variance_px2;
 };
 
+// Pose from the rectified left camera, OpenCV's lens model, and how far the column a point shows may be from
+// the one that lights it: max_residual_px, or so many sigma of the coordinate, whichever is more.
+struct ProjectorModel {
+  float rotation[9], translation_mm[3];
+  float focal_px, center_px;
+  float distortion[12];
+  float tilt[9];  // of the sensor
+  float max_residual_px, max_residual_sigma;
+};
+
 struct PointGeometry {
   float focal_px, focal_times_baseline, row_px;  // row_px: rectified, from the principal point
   float min_depth_mm, max_depth_mm;
   float squared_min_cosine, max_slope_per_disparity;
   int radius_px;
+  float sign;                       // see RawView
+  const ProjectorModel* projector;  // null: none
 };
 
 // A row's points, one behind the other; room for all pixels and 16 more.
@@ -81,9 +95,10 @@ struct PointRow {
   float* normals;    // x y z
   float* sigma_mm;
   float* coordinate_px;
-  float* coordinate_variance_px2;
-  int count;
-  long depth_range, no_normal, steep;
+  float* residual_px;  // shown column minus the projector's, of residual_count points, those included that go
+                       // for it
+  int count, residual_count;
+  long depth_range, no_normal, steep, projector;
 };
 
 // rows: disparities of the 2 radius + 1 rows around, NaN rows outside of the image. above, here, below:

@@ -34,6 +34,7 @@ inline int StartOf(const float* ranks, int length, Floats wanted, Mask valid) {
 FORGESCAN_INLINE Ints CountRanks(const float* ranks, Floats wanted, Mask valid) {
   constexpr int kUsual = 22;  // 16 pixels of equal scale, what the hint allows for, and some more
   Ints count = {};
+#pragma GCC unroll 22
   for (int i = 0; i < kUsual; ++i) {
     count = CountUp(count, LessEqual(All(ranks[i]), wanted));
   }
@@ -65,13 +66,13 @@ FORGESCAN_INLINE Match FindInSegment(Floats wanted, Mask valid, const StereoRow&
     inverse_step = LookUpNear(into.inverse_step + x, index);
     column = LookUpNear(into.column_px + x, index);
     next_column = LookUpNear(into.column_px + x + 1, index);
-    variance = LookUpNear(into.variance_px2 + x, index);
+    variance = LookUpNear(into.pair_variance_px2 + x, index);
   } else {
     coordinate = LookUp(into.coordinate_px + x, index);
     inverse_step = LookUp(into.inverse_step + x, index);
     column = LookUp(into.column_px + x, index);
     next_column = LookUp(into.column_px + x + 1, index);
-    variance = LookUp(into.variance_px2 + x, index);
+    variance = LookUp(into.pair_variance_px2 + x, index);
   }
   return {.found = in_reach & IsNumber(inverse_step),
           .part = (wanted - coordinate) * inverse_step,

@@ -3,6 +3,7 @@
 
 #include "services/reconstruction/stereo/kernel.h"
 #include "services/reconstruction/stereo/lanes.h"
+#include "services/reconstruction/stereo/projector_lanes.h"
 
 namespace forgescan {
 namespace {
@@ -71,9 +72,9 @@ inline __attribute__((noinline)) Gradient PairGradient(const PointTask& task, in
           LessEqual(All(least), along.weight) & LessEqual(All(least), across.weight)};
 }
 
-FORGESCAN_INLINE Gradient GradientAt(const PointTask& task, int x, Mask wanted,
+FORGESCAN_INLINE Gradient GradientAt(const PointTask& task, int x, Mask wanted, int radius,
                                      const PointGeometry& geometry) {
-  Gradient gradient = FullGradient(task, x, geometry.radius_px);
+  Gradient gradient = FullGradient(task, x, radius);
   if (Any(Without(wanted, gradient.known))) {
     const Gradient pairs = PairGradient(task, x, geometry);
     gradient.x = Select(gradient.known, gradient.x, pairs.x);
@@ -97,11 +98,10 @@ FORGESCAN_INLINE ColumnSlopes SlopesAt(const PointTask& task, int block) {
   return {here.column[1] + 2 * here.column[2] * LaneNumbers(), All(across)};
 }
 
-// Whether the surface falls off faster than the view angle allows from one neighbour to the other: the pixel
-// stands on a step. A missing neighbour says nothing.
-FORGESCAN_INLINE Mask IsOnStep(const PointTask& task, int x, Floats disparity,
+// rows: the disparities around. Whether the surface falls off faster than the view angle allows from one
+// neighbour to the other: the pixel stands on a step. A missing neighbour says nothing.
+FORGESCAN_INLINE Mask IsOnStep(const float* const* rows, int x, Floats disparity,
                                const PointGeometry& geometry) {
-  const float* const* const rows = task.rows + geometry.radius_px;
   const Floats limit = 2 * geometry.max_slope_per_disparity * Magnitude(disparity);
   const Floats along = Magnitude(Load(rows[0] + x + 1) - Load(rows[0] + x - 1));
   const Floats across = Magnitude(Load(rows[1] + x) - Load(rows[-1] + x));
@@ -113,6 +113,7 @@ struct SurfacePoint {
   Floats nx, ny, nz;  // towards the camera
   Floats ray_square;  // squared length of the ray to z = 1
   Mask is_steep;
+  Mask good;
 };
 
 // A plane n.p = c has the disparity (f b / c) n.ray: its gradient over x, y is (b / c) (nx, ny), and n.ray =
@@ -136,13 +137,32 @@ FORGESCAN_INLINE SurfacePoint PointOf(Floats column, Floats disparity, Floats de
           .ny = gy * length,
           .nz = gz * length,
           .ray_square = ray_square,
-          .is_steep = Less(along_ray * along_ray, geometry.squared_min_cosine * square * ray_square)};
+          .is_steep = Less(along_ray * along_ray, geometry.squared_min_cosine * square * ray_square),
+          .good = FromBits(0)};
 }
 
-FORGESCAN_INLINE void PointBlock(const PointTask& task, int block, const PointGeometry& geometry,
+// Those of the points that the projector could have lit by the column they show; notes by how much they are
+// off.
+inline __attribute__((noinline)) Mask CheckWithProjector(const PointTask& task, int x,
+                                                         const SurfacePoint& point,
+                                                         const PointGeometry& geometry, PointRow& points) {
+  const ProjectorModel& model = *geometry.projector;
+  const Floats shown = geometry.sign * Load(task.left->coordinate_px + x);
+  const Floats residual = shown - ProjectorColumn(model, point.x, point.y, point.z);
+  StorePacked(points.residual_px + points.residual_count, point.good, residual);
+  points.residual_count += static_cast<int>(Count(point.good));
+  const Floats variance = Load(task.left->variance_px2 + x);
+  const Floats square = residual * residual;
+  const Mask lit = LessEqual(square, All(model.max_residual_px * model.max_residual_px)) |
+                   LessEqual(square, model.max_residual_sigma * model.max_residual_sigma * variance);
+  points.projector += Count(Without(point.good, lit));
+  return point.good & lit;
+}
+
+FORGESCAN_INLINE void PointBlock(const PointTask& task, int block, int radius, const PointGeometry& geometry,
                                  PointRow& points) {
   const int x = block * kLanes;
-  const Floats disparity = Load(task.rows[geometry.radius_px] + x);
+  const Floats disparity = Load(task.rows[radius] + x);
   const Mask matched = IsNumber(disparity);
   if (!Any(matched)) {
     return;
@@ -150,11 +170,13 @@ FORGESCAN_INLINE void PointBlock(const PointTask& task, int block, const PointGe
   const Floats depth = geometry.focal_times_baseline / disparity;
   const Mask in_range =
       matched & LessEqual(All(geometry.min_depth_mm), depth) & LessEqual(depth, All(geometry.max_depth_mm));
-  const Gradient gradient = GradientAt(task, x, in_range, geometry);
+  const Gradient gradient = GradientAt(task, x, in_range, radius, geometry);
   const Mask has_normal = in_range & gradient.known;
-  const SurfacePoint point =
+  SurfacePoint point =
       PointOf(Load(task.left->column_px + x), disparity, depth, gradient, SlopesAt(task, block), geometry);
-  const Mask good = Without(has_normal, point.is_steep | IsOnStep(task, x, disparity, geometry));
+  point.good = Without(has_normal, point.is_steep | IsOnStep(task.rows + radius, x, disparity, geometry));
+  const Mask good =
+      geometry.projector != nullptr ? CheckWithProjector(task, x, point, geometry, points) : point.good;
   const Floats variance = Load(task.disparity->variance_px2 + x);
   const Floats sigma = Magnitude(depth / disparity) * Sqrt(variance * point.ray_square);
   const int at = points.count;
@@ -162,17 +184,26 @@ FORGESCAN_INLINE void PointBlock(const PointTask& task, int block, const PointGe
   StorePacked(points.normals + 3 * at, good, point.nx, point.ny, point.nz);
   StorePacked(points.sigma_mm + at, good, sigma);
   StorePacked(points.coordinate_px + at, good, Load(task.left->coordinate_px + x));
-  StorePacked(points.coordinate_variance_px2 + at, good, Load(task.left->variance_px2 + x));
   points.count += static_cast<int>(Count(good));
   points.depth_range += Count(Without(matched, in_range));
   points.no_normal += Count(Without(in_range, has_normal));
-  points.steep += Count(Without(has_normal, good));
+  points.steep += Count(Without(has_normal, point.good));
+}
+
+FORGESCAN_INLINE void PointBlocks(const PointTask& task, int radius, const PointGeometry& geometry,
+                                  PointRow& points) {
+  SumColumns(task, radius);
+  for (int block = 0; block < task.blocks; ++block) {
+    PointBlock(task, block, radius, geometry, points);
+  }
 }
 
 inline void TriangulateRow(const PointTask& task, const PointGeometry& geometry, PointRow& points) {
-  SumColumns(task, geometry.radius_px);
-  for (int block = 0; block < task.blocks; ++block) {
-    PointBlock(task, block, geometry, points);
+  constexpr int kUsual = 3;  // with its loops unrolled
+  if (geometry.radius_px == kUsual) {
+    PointBlocks(task, kUsual, geometry, points);
+  } else {
+    PointBlocks(task, geometry.radius_px, geometry, points);
   }
 }
 

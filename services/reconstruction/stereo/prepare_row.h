@@ -11,20 +11,30 @@ FORGESCAN_INLINE Mask IsStep(Floats step, SlopeLimits limits) {
   return LessEqual(All(limits.low), step) & LessEqual(step, All(limits.high));
 }
 
+FORGESCAN_INLINE unsigned PairBits(const float* at, SlopeLimits limits) {
+  return Bits(IsStep(Load(at + 1) - Load(at), limits));
+}
+
 // Least squares by a parabola over five pixels of one surface (Savitzky and Golay, Anal. Chem. 36 (1964)
 // 1627): no bias up to the third derivative, 17/35 of the variance. Where one of the five is missing the
-// pixel stays as it is.
-FORGESCAN_INLINE void SmoothBlock(int x, SlopeLimits limits, const StereoRow& row) {
+// pixel stays as it is. A pixel that is off its parabola by more than the limit, and by more than 4 sigma,
+// belongs to no surface.
+// pairs: which neighbours of the block, the one before and the one behind are one surface.
+FORGESCAN_INLINE void SmoothBlock(int x, const unsigned (&pairs)[3], float max_off_px, const StereoRow& row) {
   const float* const raw = row.raw_px + x;
   const Floats center = Load(raw), left = Load(raw - 1), right = Load(raw + 1);
   const Floats far_left = Load(raw - 2), far_right = Load(raw + 2);
-  const Mask smooth = IsStep(left - far_left, limits) & IsStep(center - left, limits) &
-                      IsStep(right - center, limits) & IsStep(far_right - right, limits);
+  const Mask smooth = FromBits((pairs[1] << 2 | pairs[0] >> 14) & (pairs[1] << 1 | pairs[0] >> 15) &
+                               pairs[1] & (pairs[1] >> 1 | pairs[2] << 15) & 0xffff);
   const Floats near_bend = (left - center) + (right - center);
   const Floats far_bend = (far_left - center) + (far_right - center);
+  const Floats change = 12.0F / 35 * near_bend - 3.0F / 35 * far_bend;
   const Floats variance = Load(row.variance_px2 + x);
-  Store(row.coordinate_px + x,
-        Select(smooth, center + (12.0F / 35 * near_bend - 3.0F / 35 * far_bend), center));
+  const Floats square = change * change;
+  const Mask off =
+      smooth & Less(All(max_off_px * max_off_px), square) & Less(16 * 18.0F / 35 * variance, square);
+  const Floats smoothed = Select(smooth, center + change, center);
+  Store(row.coordinate_px + x, Select(off, All(__builtin_nanf("")), smoothed));
   Store(row.variance_px2 + x, Select(smooth, 17.0F / 35 * variance, variance));
 }
 
@@ -109,8 +119,12 @@ class Segmenter {
 };
 
 inline void PrepareRow(int blocks, SlopeLimits limits, StereoRow& row) {
-  for (int block = 0; block < blocks; ++block) {
-    SmoothBlock(block * kLanes, limits, row);
+  unsigned pairs_of[3] = {0, 0, PairBits(row.raw_px, limits)};
+  for (int x = 0; x < blocks * kLanes; x += kLanes) {
+    pairs_of[0] = pairs_of[1];
+    pairs_of[1] = pairs_of[2];
+    pairs_of[2] = PairBits(row.raw_px + x + kLanes, limits);  // NaN behind the row: none
+    SmoothBlock(x, pairs_of, limits.max_off_px, row);
   }
   Segmenter segmenter(row);
   unsigned before = 0;
@@ -119,6 +133,8 @@ inline void PrepareRow(int blocks, SlopeLimits limits, StereoRow& row) {
     const Floats step = Load(row.coordinate_px + x + 1) - Load(row.coordinate_px + x);
     const Mask is_pair = IsStep(step, limits);
     Store(row.inverse_step + x, Select(is_pair, 1 / step, All(__builtin_nanf(""))));
+    const Floats variance = Load(row.variance_px2 + x), next_variance = Load(row.variance_px2 + x + 1);
+    Store(row.pair_variance_px2 + x, Select(Less(variance, next_variance), next_variance, variance));
     const unsigned pairs = Bits(is_pair);
     row.pair_bits[block] = static_cast<std::uint16_t>(pairs);
     segmenter.AddBlock(x, pairs, (pairs | pairs << 1 | before) & 0xffff);

@@ -26,7 +26,7 @@ class RowArrays {
 class PreparedRow {
  public:
   PreparedRow(int blocks, float* coordinate_px, float* variance_px2, float* column_px)
-      : arrays_(2, blocks * kStereoLanes),
+      : arrays_(3, blocks * kStereoLanes),
         ranks_(static_cast<std::size_t>(blocks * kStereoLanes + (kMaxSegments + 1) * kSegmentMargin)),
         pair_bits_(static_cast<std::size_t>(blocks)),
         segments_(kMaxSegments) {
@@ -35,6 +35,7 @@ class PreparedRow {
             .variance_px2 = variance_px2,
             .column_px = column_px,
             .inverse_step = arrays_[1],
+            .pair_variance_px2 = arrays_[2],
             .ranks = ranks_.data(),
             .pair_bits = pair_bits_.data(),
             .segments = segments_.data(),

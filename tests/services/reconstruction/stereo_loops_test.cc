@@ -94,10 +94,10 @@ Row TriangulateAll(const StereoKernel& kernel, bool with_holes) {
   const DisparityRow disparity = {disparities[4], scratch[3]};
   Row out(9 * kRoom, 0);
   float* const at = out.data();
-  PointRow points = {at, at + 3 * kRoom, at + 6 * kRoom, at + 7 * kRoom, at + 8 * kRoom, 0, 0, 0, 0};
+  PointRow points = {at, at + 3 * kRoom, at + 6 * kRoom, at + 7 * kRoom, at + 8 * kRoom, 0, 0, 0, 0, 0, 0};
   kernel.triangulate({rows.data(), &left.row(), &disparity, blocks.data(), blocks.data(), blocks.data(),
                       scratch[4], scratch[5], kBlocks},
-                     {1000, 100000, 5, 50, 10000, 0.117F, 0.003F, 3}, points);
+                     {1000, 100000, 5, 50, 10000, 0.117F, 0.003F, 3, 1, nullptr}, points);
   // Behind the points stands whatever was packed last.
   std::fill(at + 3 * points.count, at + 3 * kRoom, 0.0F);
   std::fill(at + 3 * kRoom + 3 * points.count, at + 6 * kRoom, 0.0F);

@@ -9,6 +9,7 @@
 #include <cstring>
 #include <limits>
 #include <opencv2/core.hpp>
+#include <string>
 
 #include "tests/services/reconstruction/decoded_scene.h"
 #include "tests/services/reconstruction/fringe_scene.h"
@@ -80,24 +81,21 @@ Result<StereoPoints> RunViews(const Views& views, int threads = 1, StereoPoints 
 struct Errors {
   long flying = 0;  // farther from the surface, along the ray, than 4 sigma + 0.05 mm
   double rms_in_sigma = 0;
-  double median_mm = 0;
+  double mean_mm = 0;  // along the ray; > 0: behind the surface
 };
 
 Errors Against(const DecodedScene& scene, const PointCloud& cloud) {
   const Eigen::Matrix3d left_from_rectified = RectifiedFromLeft(SmallRig()).transpose();
   Errors errors;
-  std::vector<double> sizes;
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     const Eigen::Vector3d p = left_from_rectified * cloud.points[i].cast<double>();
     const double off = (1 - scene.hit(Eigen::Vector3d::Zero(), p)) * p.norm();
     const auto sigma = static_cast<double>(cloud.sigma_mm[i]);
     errors.flying += std::abs(off) > 4 * sigma + 0.05 ? 1 : 0;
     errors.rms_in_sigma += off * off / (sigma * sigma);
-    sizes.push_back(std::abs(off));
+    errors.mean_mm += off / static_cast<double>(cloud.size());
   }
   errors.rms_in_sigma = std::sqrt(errors.rms_in_sigma / static_cast<double>(cloud.size()));
-  std::nth_element(sizes.begin(), sizes.begin() + std::ssize(sizes) / 2, sizes.end());
-  errors.median_mm = sizes[sizes.size() / 2];
   return errors;
 }
 
@@ -111,11 +109,27 @@ TEST(StereoPoints, PredictTheirOwnNoiseOnAPlate) {
   const DecodedScene scene = Plate({}, 0.05);
   const auto points = RunViews(See(scene));
   ASSERT_TRUE(points.ok()) << points.error().message;
-  EXPECT_GT(points->cloud_in_camera.size(), 45000U);
+  EXPECT_GT(points->cloud_in_camera.size(), 30000U);
   EXPECT_NEAR(Against(scene, points->cloud_in_camera).rms_in_sigma, 1,
-              0.03);  // 45,000 points, a few of them correlated
-  EXPECT_LT(points->count.no_partner + points->count.left_right + points->count.steep,
-            points->count.candidates / 10);
+              0.03);  // 30,000 points, a few of them correlated
+  EXPECT_LT(points->count.left_right + points->count.steep + points->count.no_normal,
+            points->count.candidates / 20);
+}
+
+// What straight lines between pixels make of a curved surface, at pixels of 0.7 mm.
+TEST(StereoPoints, ABallIsHardlyTooDeep) {
+  DecodedScene scene = Plate({}, 0);
+  scene.hit = [](const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) {
+    const Eigen::Vector3d from = origin - Eigen::Vector3d(5, -3, 430);
+    const double a = direction.squaredNorm(), b = direction.dot(from), c = from.squaredNorm() - 45.0 * 45.0;
+    return b * b - a * c > 0 ? (-b - std::sqrt(b * b - a * c)) / a : -1;
+  };
+  const auto points = RunViews(See(scene));
+  ASSERT_TRUE(points.ok()) << points.error().message;
+  EXPECT_GT(points->cloud_in_camera.size(), 4000U);
+  const double mean_mm = Against(scene, points->cloud_in_camera).mean_mm;
+  RecordProperty("mean_um", std::to_string(1000 * mean_mm));
+  EXPECT_NEAR(mean_mm, 0, 0.008);
 }
 
 TEST(StereoPoints, StepsHolesAndThinPartsGiveNoFlyingPoints) {
@@ -181,7 +195,14 @@ TEST(StereoPoints, FringesThatRunTheOtherWayGiveTheSamePoints) {
   ASSERT_TRUE(a.ok() && b.ok());
   ASSERT_NEAR(static_cast<double>(a->cloud_in_camera.size()), static_cast<double>(b->cloud_in_camera.size()),
               50);
-  EXPECT_NEAR(b->sample[100].coordinate_px, 512 - a->sample[100].coordinate_px, 1e-3);
+  const auto mean = [](const std::vector<LitPoint>& sample) {
+    double sum = 0;
+    for (const LitPoint& point : sample) {
+      sum += static_cast<double>(point.coordinate_px);
+    }
+    return sum / static_cast<double>(sample.size());
+  };
+  EXPECT_NEAR(mean(b->sample), 512 - mean(a->sample), 1);  // of nearly, not exactly the same points
 }
 
 TEST(StereoPoints, LeaveOutWhatIsNoNumber) {
@@ -204,6 +225,7 @@ TEST(StereoPoints, LeaveOutWhatIsNoNumber) {
 TEST(StereoPoints, RefuseViewsThatAreNone) {
   const Views good = See(Plate({}, 0.02));
   Views dark = good;
+  dark.right.cause = good.right.cause.clone();
   dark.right.cause.setTo(static_cast<std::uint8_t>(MaskCause::kLowModulation));
   EXPECT_THAT(RunViews(dark).error().message, HasSubstr("the right view changes by 0.0000 px"));
   Views against = good;
@@ -221,9 +243,10 @@ TEST(StereoPoints, OnesTheProjectorCouldNotLightAreLeftOut) {
   const auto all = ComputeStereoPoints(views.left, views.right, Rig(true), config);
   ASSERT_TRUE(all.ok()) << all.error().message;
   EXPECT_EQ(all->count.projector, 0);
-  EXPECT_NEAR(all->median_projector_residual_px.value(), 0, 0.002);  // px; 45,000 residuals of 0.02
+  EXPECT_NEAR(all->median_projector_residual_px.value(), 0, 0.002);  // px; 30,000 residuals of 0.02
   for (cv::Mat_<float>* map : {&views.left.coordinate_px, &views.right.coordinate_px}) {
-    (*map)(cv::Rect(0, 0, 320, 80)) += cv::Scalar(5);  // both cameras agree, on a column that was not projected there
+    (*map)(cv::Rect(0, 0, 320, 80)) +=
+        cv::Scalar(5);  // both cameras agree, on a column that was not projected there
   }
   const auto some = ComputeStereoPoints(views.left, views.right, Rig(true), config);
   ASSERT_TRUE(some.ok()) << some.error().message;
