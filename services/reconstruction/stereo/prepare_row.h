@@ -64,6 +64,8 @@ class Segmenter {
     }
   }
 
+  bool is_full() const { return is_full_; }
+
   void Finish(int end) {
     End(end);
     row_.segment_count += 1;
@@ -108,10 +110,6 @@ class Segmenter {
     }
   }
 
- public:
-  bool is_full() const { return is_full_; }
-
- private:
   StereoRow& row_;
   float last_ = 0;
   int shift_ = 0;
