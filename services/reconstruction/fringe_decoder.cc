@@ -93,7 +93,7 @@ Result<FringeDecoder> FringeDecoder::Create(PatternSet pattern, const Reconstruc
                                                         config.dead_margin_fraction));
   decoder.config_ = config;
   decoder.pattern_ = std::move(pattern);
-  decoder.path_ = path.value_or(SimdPath::kBaseline);
+  decoder.path_ = path.value_or(SimdPath::kPlain);
   if (path) {
     decoder.packed_ =
         PackedDecoder::Make({decoder.pattern_, config, decoder.estimator_, decoder.table_}, *path);

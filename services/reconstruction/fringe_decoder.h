@@ -53,7 +53,7 @@ class FringeDecoder {
   PhaseEstimator estimator_;
   FringeOrderTable table_;
   std::shared_ptr<ViewPool> pool_ = std::make_shared<ViewPool>();
-  SimdPath path_ = SimdPath::kBaseline;
+  SimdPath path_ = SimdPath::kPlain;
   std::optional<PackedDecoder> packed_;
 };
 

@@ -18,6 +18,14 @@ class HistogramMedian {
     ++total_;
   }
 
+  // The values of another one, of the same range and bins.
+  void Add(const HistogramMedian& other) {
+    for (std::size_t bin = 0; bin < counts_.size(); ++bin) {
+      counts_[bin] += other.counts_[bin];
+    }
+    total_ += other.total_;
+  }
+
   long total() const { return total_; }
 
   // Interpolated inside the bin; only if total() > 0.

@@ -3,7 +3,7 @@
 
 #include "services/reconstruction/decoded_view.h"
 #include "services/reconstruction/reconstruction_config.h"
-#include "services/reconstruction/simd_path.h"
+#include "services/common/simd_path.h"
 
 namespace forgescan {
 

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <span>
 
-#include "services/reconstruction/simd_path.h"
+#include "services/common/simd_path.h"
 
 namespace forgescan {
 

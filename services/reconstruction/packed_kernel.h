@@ -5,7 +5,7 @@
 #include <array>
 #include <cstdint>
 
-#include "services/reconstruction/simd_path.h"
+#include "services/common/simd_path.h"
 
 namespace forgescan {
 

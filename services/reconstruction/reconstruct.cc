@@ -2,13 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <opencv2/core.hpp>
 #include <utility>
 
-#include "services/reconstruction/disparity.h"
 #include "services/reconstruction/histogram_median.h"
-#include "services/reconstruction/rectify_coordinates.h"
-#include "services/reconstruction/triangulate.h"
+#include "services/reconstruction/stereo_points.h"
 
 namespace forgescan {
 namespace {
@@ -17,19 +16,24 @@ Error InCamera(const char* name, const Error& error) {
   return Error{error.code, fmt::format("{} camera: {}", name, error.message), error.where};
 }
 
-// Two cameras never see the same noise: equal frames are one camera given twice.
+// Two cameras never see the same noise: equal frames are one camera given twice. Ends with the first row that
+// differs.
 bool AreSame(std::span<const cv::Mat> left, std::span<const cv::Mat> right) {
-  return std::equal(left.begin(), left.end(), right.begin(), right.end(),
-                    [](const cv::Mat& a, const cv::Mat& b) {
-                      return !a.empty() && a.size() == b.size() && a.type() == b.type() &&
-                             cv::norm(a, b, cv::NORM_INF) == 0;
-                    });
+  return std::equal(
+      left.begin(), left.end(), right.begin(), right.end(), [](const cv::Mat& a, const cv::Mat& b) {
+        bool same = !a.empty() && a.dims == 2 && b.dims == 2 && a.size() == b.size() && a.type() == b.type();
+        for (int row = 0; same && row < a.rows; ++row) {
+          same = std::memcmp(a.ptr(row), b.ptr(row), static_cast<std::size_t>(a.cols) * a.elemSize()) == 0;
+        }
+        return same;
+      });
 }
 
 double MedianSigmaMm(const PointCloud& cloud) {
   HistogramMedian median(0, 1, 10000);
-  for (const float sigma_mm : cloud.sigma_mm) {
-    median.Add(static_cast<double>(sigma_mm));
+  const std::size_t step = cloud.size() / 100'000 + 1;  // plenty for a median
+  for (std::size_t i = 0; i < cloud.size(); i += step) {
+    median.Add(static_cast<double>(cloud.sigma_mm[i]));
   }
   return median.total() > 0 ? median.Median() : 0;
 }
@@ -96,23 +100,16 @@ Result<Reconstruction> Reconstructor::Run(std::span<const cv::Mat> left,
   if (AreSame(left, right)) {
     return Fail(ErrorCode::kInvalidArgument, "the left and the right frames are the same images");
   }
-  ASSIGN_OR_RETURN(const Camera left_camera, DecodeCamera(left, "left"));
-  ASSIGN_OR_RETURN(const Camera right_camera, DecodeCamera(right, "right"));
-  const RectifiedView left_view = RectifyCoordinates(left_camera.view, rig_.left_map, config_);
-  const RectifiedView right_view = RectifyCoordinates(right_camera.view, rig_.right_map, config_);
-  ASSIGN_OR_RETURN(const DisparityMap map, MatchViews(left_view, right_view, rig_, config_));
-  Triangulation points = Triangulate(map, left_view, rig_, config_);
+  ASSIGN_OR_RETURN(Camera left_camera, DecodeCamera(left, "left"));
+  ASSIGN_OR_RETURN(Camera right_camera, DecodeCamera(right, "right"));
+  auto computed = ComputeStereoPoints(left_camera.view, right_camera.view, rig_, config_);
+  decoder_.Recycle(std::move(left_camera.view));
+  decoder_.Recycle(std::move(right_camera.view));
+  ASSIGN_OR_RETURN(StereoPoints points, std::move(computed));
   Reconstruction result;
   result.quality = {.left = left_camera.quality,
                     .right = right_camera.quality,
-                    .candidates = map.candidates,
-                    .no_partner = map.no_partner,
-                    .ambiguous = map.ambiguous,
-                    .left_right = map.left_right,
-                    .depth_range = points.depth_range,
-                    .no_normal = points.no_normal,
-                    .steep = points.steep,
-                    .projector = points.projector,
+                    .stereo = points.count,
                     .median_projector_residual_px = points.median_projector_residual_px,
                     .projector_consistency = MeasureProjectorConsistency(points.sample, rig_.baseline_mm),
                     .median_sigma_mm = MedianSigmaMm(points.cloud_in_camera)};
@@ -123,7 +120,7 @@ Result<Reconstruction> Reconstructor::Run(std::span<const cv::Mat> left,
 
 Status Reconstructor::Judge(const Reconstruction& reconstruction) const {
   const ReconstructionQuality& quality = reconstruction.quality;
-  const auto points = static_cast<long>(reconstruction.cloud_in_camera.size());
+  const long points = quality.stereo.points;
   const auto& residual_px = quality.median_projector_residual_px;
   if (residual_px && std::abs(*residual_px) > config_.max_median_projector_residual_px) {
     return Fail(ErrorCode::kUntrusted,
@@ -131,12 +128,13 @@ Status Reconstructor::Judge(const Reconstruction& reconstruction) const {
                 "calibration drifted",
                 *residual_px, config_.max_median_projector_residual_px);
   }
-  if (static_cast<double>(points) < config_.min_matched_fraction * static_cast<double>(quality.candidates)) {
+  if (static_cast<double>(points) <
+      config_.min_matched_fraction * static_cast<double>(quality.stereo.candidates)) {
     return Fail(ErrorCode::kUntrusted,
                 "only {} of {} decoded pixels became points, limit {:.0f} %: the cameras may be exchanged, "
                 "or the calibration "
                 "is of another rig",
-                points, quality.candidates, 100 * config_.min_matched_fraction);
+                points, quality.stereo.candidates, 100 * config_.min_matched_fraction);
   }
   if (points < config_.min_points) {
     return Fail(ErrorCode::kUntrusted, "the view has {} points, at least {} are needed", points,

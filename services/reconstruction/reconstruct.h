@@ -14,6 +14,7 @@
 #include "services/reconstruction/pattern_set.h"
 #include "services/reconstruction/projector_consistency.h"
 #include "services/reconstruction/reconstruction_config.h"
+#include "services/reconstruction/stereo_points.h"
 #include "services/reconstruction/stereo_rig.h"
 #include "services/reconstruction/trust.h"
 
@@ -31,23 +32,15 @@ struct CameraQuality {
 struct ReconstructionQuality {
   CameraQuality left;
   CameraQuality right;
-  long candidates =
-      0;  // rectified left pixels that had a coordinate; the following ones lost it, in this order
-  long no_partner = 0;
-  long ambiguous = 0;
-  long left_right = 0;
-  long depth_range = 0;
-  long no_normal = 0;
-  long steep = 0;
-  long projector = 0;
+  StereoCounts stereo;
   std::optional<double> median_projector_residual_px;
   std::optional<ProjectorConsistency> projector_consistency;  // nothing with too few points
   double median_sigma_mm = 0;
 };
 
 struct Reconstruction {
-  PointCloud
-      cloud_in_camera;  // rectified left camera (see StereoRig), scanner order; points, normals, sigma_mm
+  PointCloud cloud_in_camera;  // rectified left camera (see StereoRig), scanner order, thinned as configured;
+                               // points, normals, sigma_mm
   ReconstructionQuality quality;
 };
 

@@ -51,6 +51,7 @@ Status Check(const ReconstructionConfig& c) {
       Range{"max_parallax_ratio", c.max_parallax_ratio, 1, 1e9},
       Range{"min_matched_fraction", c.min_matched_fraction, 0, 1},
       Range{"min_points", static_cast<double>(c.min_points), 1, 1e9},
+      Range{"keep_every_nth_point", static_cast<double>(c.keep_every_nth_point), 1, 1000},
       Range{"threads", static_cast<double>(c.threads), 1, 256},
   };
   for (const Range& range : ranges) {

@@ -63,6 +63,8 @@ struct ReconstructionConfig {
   double min_matched_fraction = 0.25;  // less than this part of the decoded pixels finds its partner
   int min_points = 1000;               // or fewer points remain.
 
+  int keep_every_nth_point = 1;  // of the points of a row, beginning elsewhere in every row; all are checked
+
   int threads = 2;
 };
 

@@ -7,7 +7,6 @@
 #include "services/common/bus/channels.h"
 #include "services/common/bus/cloud_stream.h"
 #include "services/common/service/step_timer.h"
-#include "services/reconstruction/thin_cloud.h"
 
 namespace forgescan {
 namespace {
@@ -176,8 +175,9 @@ Result<Reconstruction> ReconstructionService::Run(const ViewCollector& view) {
   const ImageSize size{left.front().cols, left.front().rows};
   if (reconstructor_ == nullptr || size.width_px != image_size_.width_px ||
       size.height_px != image_size_.height_px) {
-    ASSIGN_OR_RETURN(Reconstructor made,
-                     Reconstructor::Create(pattern_, calibration_, size, config_.reconstruction));
+    ReconstructionConfig config = config_.reconstruction;
+    config.keep_every_nth_point = config_.publish_every_nth_point;
+    ASSIGN_OR_RETURN(Reconstructor made, Reconstructor::Create(pattern_, calibration_, size, config));
     reconstructor_ = std::make_unique<Reconstructor>(std::move(made));
     image_size_ = size;
   }
@@ -202,7 +202,8 @@ void ReconstructionService::Finish(Key key, const ViewCollector& view) {
     if (reconstruction.ok()) {
       Describe(reconstruction->quality.left, result);
       result.sigma_median_mm = reconstruction->quality.median_sigma_mm;
-      cloud = EveryNthPoint(reconstruction->cloud_in_camera, config_.publish_every_nth_point, key.second);
+      cloud = std::move(reconstruction->cloud_in_camera);
+      cloud.view.assign(cloud.size(), static_cast<std::uint16_t>(key.second));
     }
   }
   result.status = result.reason.empty() ? fsmsg::view_result_t::STATUS_OK : fsmsg::view_result_t::STATUS_VOID;

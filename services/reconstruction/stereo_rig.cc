@@ -7,7 +7,6 @@
 #include <numbers>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core/eigen.hpp>
-#include <opencv2/imgproc.hpp>
 #include <utility>
 #include <vector>
 
@@ -18,14 +17,6 @@ cv::Mat ToMat(const Eigen::Matrix3d& matrix) {
   cv::Mat result;
   cv::eigen2cv(matrix, result);
   return result;
-}
-
-cv::Mat_<cv::Vec2f> RectifyingMap(const CameraIntrinsics& camera, const cv::Mat& rotation,
-                                  const cv::Mat& projection, cv::Size size) {
-  cv::Mat map, unused;
-  cv::initUndistortRectifyMap(ToMat(camera.camera_matrix), camera.distortion, rotation, projection, size,
-                              CV_32FC2, map, unused);
-  return map;
 }
 
 // Where a ray at the tangent `radius` from the axis ends up, by the radial terms of OpenCV's model.
@@ -129,8 +120,8 @@ Result<StereoRig> MakeStereoRig(const StereoCalibration& calibration, ImageSize 
                 "the cameras stand above each other; the baseline must run along image rows");
   }
   StereoRig rig;
-  rig.left_map = RectifyingMap(calibration.left, r1, p1, size);
-  rig.right_map = RectifyingMap(calibration.right, r2, p2, size);
+  ASSIGN_OR_RETURN(rig.left_lines, EpipolarTable::Build(calibration.left, r1, p1, image_size));
+  ASSIGN_OR_RETURN(rig.right_lines, EpipolarTable::Build(calibration.right, r2, p2, image_size));
   rig.focal_px = p1.at<double>(0, 0);
   rig.left_center_x_px = p1.at<double>(0, 2);
   rig.right_center_x_px = p2.at<double>(0, 2);

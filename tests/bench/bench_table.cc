@@ -68,7 +68,9 @@ std::pair<std::string, std::string> Split(std::string name) {
 
 Row& RowOf(std::vector<Row>& rows, const std::string& who) {
   const auto found = std::find_if(rows.begin(), rows.end(), [&](const Row& row) { return row.who == who; });
-  return found != rows.end() ? *found : rows.emplace_back(Row{.who = who});
+  if (found != rows.end()) return *found;
+  rows.emplace_back().who = who;
+  return rows.back();
 }
 
 void Read(const std::string& path, Steps& steps) {

@@ -29,7 +29,7 @@ using SaidState = fsmsg::service_state_t;
 
 constexpr const char* kBus = "udpm://239.255.76.67:7679?ttl=0&recv_buf_size=104857600";
 // A scanner whose cameras and projector stand farther apart than it was told puts every surface too deep.
-constexpr double kBaselineScale = 1.0003;
+constexpr double kPlainScale = 1.0003;
 constexpr std::int64_t kReadyUs = 60'000'000;
 constexpr std::int64_t kVerdictUs = 240'000'000;  // from the end of playing to the last verdict
 constexpr const char* kSpeed = "1";               // as recorded: the programs keep their own time
@@ -50,7 +50,7 @@ std::string Rescaled(const std::string& calibration) {
     std::istringstream numbers((*match)[2].str());
     const char* separator = " ";
     for (std::string number; std::getline(numbers, number, ','); separator = ", ") {
-      text += fmt::format("{}{}", separator, kBaselineScale * std::stod(number));
+      text += fmt::format("{}{}", separator, kPlainScale * std::stod(number));
     }
     rest = (*match)[2].second;
   }

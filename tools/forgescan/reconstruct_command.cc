@@ -66,15 +66,15 @@ nlohmann::json ToJson(const Reconstruction& reconstruction) {
   const ReconstructionQuality& quality = reconstruction.quality;
   nlohmann::json json = {{"points", reconstruction.cloud_in_camera.size()},
                          {"median_sigma_mm", quality.median_sigma_mm},
-                         {"candidates", quality.candidates},
+                         {"candidates", quality.stereo.candidates},
                          {"dropped",
-                          {{"no_partner", quality.no_partner},
-                           {"ambiguous", quality.ambiguous},
-                           {"left_right", quality.left_right},
-                           {"depth_range", quality.depth_range},
-                           {"no_normal", quality.no_normal},
-                           {"steep", quality.steep},
-                           {"projector", quality.projector}}},
+                          {{"no_partner", quality.stereo.no_partner},
+                           {"ambiguous", quality.stereo.ambiguous},
+                           {"left_right", quality.stereo.left_right},
+                           {"depth_range", quality.stereo.depth_range},
+                           {"no_normal", quality.stereo.no_normal},
+                           {"steep", quality.stereo.steep},
+                           {"projector", quality.stereo.projector}}},
                          {"left", ToJson(quality.left)},
                          {"right", ToJson(quality.right)}};
   if (quality.median_projector_residual_px) {

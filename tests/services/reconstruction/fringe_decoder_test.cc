@@ -110,7 +110,7 @@ TEST(FringeDecoder, EveryPathAndNumberOfThreadsGivesEqualBytes) {
     ReconstructionConfig config;
     config.threads = 1;
     const StationScene scene = RenderStation(size, pattern, config.noise);
-    const DecodedView first = Decode(Decoder(pattern, config, SimdPath::kBaseline), scene.frames);
+    const DecodedView first = Decode(Decoder(pattern, config, SimdPath::kPlain), scene.frames);
     for (const SimdPath path : AvailableSimdPaths()) {
       for (const int threads : {1, 2, 5}) {
         SCOPED_TRACE(NameOf(path));

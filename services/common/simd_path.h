@@ -6,9 +6,9 @@
 
 namespace forgescan {
 
-enum class SimdPath { kBaseline, kAvx2, kAvx512 };
+enum class SimdPath { kPlain, kAvx2, kAvx512 };
 
-// What this processor can run, slowest first; kBaseline is always there.
+// What this processor can run, slowest first; kPlain is always there.
 std::vector<SimdPath> AvailableSimdPaths();
 SimdPath BestSimdPath();
 std::string_view NameOf(SimdPath path);

@@ -1,0 +1,128 @@
+// The inner loops of stereo, one set of functions for each instruction set; all of them give the same bytes.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+namespace forgescan {
+
+constexpr int kStereoLanes = 16;    // pixels of a block
+constexpr int kRowMargin = 64;      // floats that may be read before and behind a row; NaN
+constexpr int kMaxSegments = 64;    // of a row; more is no surface
+constexpr int kSegmentMargin = 64;  // floats behind each segment's ranks
+
+// Where the epipolar line of one rectified row runs through 16 columns of a raw image, at column 16 block +
+// i: raw row = row[0] + i (row[1] + i row[2]), rectified column likewise, measured from the principal point.
+// px.
+struct EpipolarBlock {
+  float row[3];
+  float column[3];
+  std::uint16_t first_row;  // the line runs between the raw rows first_row .. first_row + row_count
+  std::uint16_t row_count;  // 0: it is outside of the image
+};
+
+// Raw images; strides in elements.
+struct RawView {
+  const float* coordinate_px;
+  const float* sigma_px;
+  const std::uint8_t* cause;  // 0: valid
+  std::ptrdiff_t coordinate_stride, sigma_stride, cause_stride;
+  int width, height;
+  float max_step_px;  // largest difference of two neighbours on one surface
+  float sign;         // makes coordinates ascend along a row
+};
+
+// Pixels begin .. end - 1 of a row whose coordinates ascend, gaps included.
+struct RowSegment {
+  int begin, end;
+  int ranks;  // where in StereoRow::ranks its coordinates begin
+  float low, high;
+};
+
+// What is known along one epipolar line, at the raw columns. All arrays have kRowMargin readable floats at
+// either end.
+struct StereoRow {
+  float* raw_px;         // coordinate between two raw rows; NaN: none
+  float* coordinate_px;  // the same, smoothed along the row
+  float* variance_px2;
+  float* column_px;     // rectified, from the principal point
+  float* inverse_step;  // 1 / (coordinate[x + 1] - coordinate[x]); NaN unless x and x + 1 are one surface
+  float* pair_variance_px2;  // the larger one of x and x + 1
+  float* ranks;              // coordinates of the segments, gaps filled from the left, +inf behind each
+  std::uint16_t* pair_bits;  // of each block: x and x + 1 are one surface
+  RowSegment* segments;      // kMaxSegments
+  int segment_count;         // kMaxSegments + 1: too many
+};
+
+struct SlopeLimits {
+  float low, high;   // projector px per camera px, both > 0
+  float max_off_px;  // of a pixel from the parabola through it and its neighbours
+};
+
+struct MatchCounts {
+  long candidates = 0, no_partner = 0, ambiguous = 0, left_right = 0;
+};
+
+// Disparity of the left pixels of a row, from the principal points. NaN: none.
+struct DisparityRow {
+  float* disparity_px;
+  float* variance_px2;
+};
+
+// Pose from the rectified left camera, OpenCV's lens model, and how far the column a point shows may be from
+// the one that lights it: max_residual_px, or so many sigma of the coordinate, whichever is more.
+struct ProjectorModel {
+  float rotation[9], translation_mm[3];
+  float focal_px, center_px;
+  float distortion[12];
+  float tilt[9];  // of the sensor
+  float max_residual_px, max_residual_sigma;
+};
+
+struct PointGeometry {
+  float focal_px, focal_times_baseline, row_px;  // row_px: rectified, from the principal point
+  float min_depth_mm, max_depth_mm;
+  float squared_min_cosine, max_slope_per_disparity;
+  int radius_px;
+  float sign;                       // see RawView
+  const ProjectorModel* projector;  // null: none
+};
+
+// A row's points, one behind the other; room for all pixels and 16 more.
+struct PointRow {
+  float* points_mm;  // x y z
+  float* normals;    // x y z
+  float* sigma_mm;
+  float* coordinate_px;
+  float* residual_px;  // shown column minus the projector's, of residual_count points, those included that go
+                       // for it
+  int count, residual_count;
+  long depth_range, no_normal, steep, projector;
+};
+
+// rows: disparities of the 2 radius + 1 rows around, NaN rows outside of the image. above, here, below:
+// blocks of the epipolar table. sums, moments: scratch rows with margins.
+struct PointTask {
+  const float* const* rows;
+  const StereoRow* left;
+  const DisparityRow* disparity;
+  const EpipolarBlock *above, *here, *below;
+  float *sums, *moments;
+  int blocks;
+};
+
+struct StereoKernel {
+  const char* name;
+  void (*sample)(const RawView& view, const EpipolarBlock* blocks, const StereoRow& row);
+  void (*prepare)(int blocks, SlopeLimits limits, StereoRow& row);
+  // hints: one a block, where the partner was in the row above; any numbers will do.
+  MatchCounts (*match)(int blocks, const StereoRow& left, const StereoRow& right, float max_left_right_px,
+                       int* hints, const DisparityRow& disparity);
+  void (*triangulate)(const PointTask& task, const PointGeometry& geometry, PointRow& points);
+};
+
+// Those this processor can run, the fastest first; the last one runs everywhere.
+std::span<const StereoKernel* const> StereoKernels();
+
+}  // namespace forgescan

@@ -1,0 +1,186 @@
+// Sixteen floats side by side, and masks of them: what the stereo kernels compute with. One translation unit
+// each for AVX-512, AVX2 and plain x86-64 includes this; every operation gives the same bits on all of them
+// (no fused multiply-add, see CMakeLists.txt). Nothing here may be called from elsewhere.
+#pragma once
+
+#include <immintrin.h>
+
+#include <cstdint>
+
+#define FORGESCAN_INLINE inline __attribute__((always_inline))
+
+namespace forgescan {
+namespace {
+
+constexpr int kLanes = 16;
+using Floats = float __attribute__((vector_size(64)));
+using Ints = std::int32_t __attribute__((vector_size(64)));
+
+FORGESCAN_INLINE Floats Load(const float* at) {
+  Floats value;
+  __builtin_memcpy(&value, at, sizeof(value));
+  return value;
+}
+FORGESCAN_INLINE void Store(float* at, Floats value) { __builtin_memcpy(at, &value, sizeof(value)); }
+FORGESCAN_INLINE Floats All(float value) { return Floats{} + value; }
+FORGESCAN_INLINE Floats LaneNumbers() { return Floats{0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15}; }
+FORGESCAN_INLINE Floats Magnitude(Floats value) { return (Floats)((Ints)value & 0x7fffffff); }
+// Towards zero; |value| < 2^31.
+FORGESCAN_INLINE Floats Truncated(Floats value) {
+  return __builtin_convertvector(__builtin_convertvector(value, Ints), Floats);
+}
+// 1 / sqrt(value) of a positive, normal number, to about 2e-7 of it: a first guess from the bits, then three
+// steps of Newton's method. Unlike the instruction for it, the same on every processor.
+FORGESCAN_INLINE Floats InverseSqrt(Floats value) {
+  Floats y = (Floats)(0x5f3759df - ((Ints)value >> 1));
+  const Floats half = 0.5F * value;
+  for (int i = 0; i < 3; ++i) {
+    y = y * (1.5F - half * y * y);
+  }
+  return y;
+}
+
+#ifdef __AVX512F__
+
+struct Mask {
+  __mmask16 bits;
+};
+FORGESCAN_INLINE unsigned Bits(Mask mask) { return mask.bits; }
+FORGESCAN_INLINE Mask FromBits(unsigned bits) { return {static_cast<__mmask16>(bits)}; }
+FORGESCAN_INLINE Mask Less(Floats a, Floats b) { return {_mm512_cmp_ps_mask(a, b, _CMP_LT_OQ)}; }
+FORGESCAN_INLINE Mask LessEqual(Floats a, Floats b) { return {_mm512_cmp_ps_mask(a, b, _CMP_LE_OQ)}; }
+FORGESCAN_INLINE Mask Equal(Floats a, Floats b) { return {_mm512_cmp_ps_mask(a, b, _CMP_EQ_OQ)}; }
+FORGESCAN_INLINE Floats Select(Mask mask, Floats yes, Floats no) {
+  return _mm512_mask_blend_ps(mask.bits, no, yes);
+}
+FORGESCAN_INLINE Ints CountUp(Ints count, Mask mask) {
+  return (Ints)_mm512_mask_add_epi32((__m512i)count, mask.bits, (__m512i)count, _mm512_set1_epi32(1));
+}
+FORGESCAN_INLINE Mask Above(Ints a, int limit) {
+  return {_mm512_cmpgt_epi32_mask((__m512i)a, _mm512_set1_epi32(limit))};
+}
+FORGESCAN_INLINE Floats Sqrt(Floats value) { return _mm512_sqrt_ps(value); }
+// from[index] for 0 <= index < 32; other lanes are anything.
+FORGESCAN_INLINE Floats LookUpNear(const float* from, Ints index) {
+  return _mm512_permutex2var_ps(Load(from), (__m512i)index, Load(from + kLanes));
+}
+FORGESCAN_INLINE Floats LookUp(const float* from, Ints index) {
+  return _mm512_i32gather_ps((__m512i)index, from, 4);
+}
+// The chosen lanes one behind the other; writes all 16.
+FORGESCAN_INLINE void StorePacked(float* at, Mask mask, Floats value) {
+  Store(at, _mm512_maskz_compress_ps(mask.bits, value));
+}
+// x, y, z of the chosen lanes one behind the other; writes all 48.
+FORGESCAN_INLINE void StorePacked(float* at, Mask mask, Floats x, Floats y, Floats z) {
+  alignas(64) static constexpr int kXy[3][16] = {{0, 16, 0, 1, 17, 0, 2, 18, 0, 3, 19, 0, 4, 20, 0, 5},
+                                                 {21, 0, 6, 22, 0, 7, 23, 0, 8, 24, 0, 9, 25, 0, 10, 26},
+                                                 {0, 11, 27, 0, 12, 28, 0, 13, 29, 0, 14, 30, 0, 15, 31, 0}};
+  alignas(64) static constexpr int kZ[3][16] = {{0, 1, 16, 3, 4, 17, 6, 7, 18, 9, 10, 19, 12, 13, 20, 15},
+                                                {0, 21, 2, 3, 22, 5, 6, 23, 8, 9, 24, 11, 12, 25, 14, 15},
+                                                {26, 1, 2, 27, 4, 5, 28, 7, 8, 29, 10, 11, 30, 13, 14, 31}};
+  const Floats px = _mm512_maskz_compress_ps(mask.bits, x);
+  const Floats py = _mm512_maskz_compress_ps(mask.bits, y);
+  const Floats pz = _mm512_maskz_compress_ps(mask.bits, z);
+  for (int i = 0; i < 3; ++i) {
+    const Floats xy = _mm512_permutex2var_ps(px, _mm512_load_si512(kXy[i]), py);
+    Store(at + i * kLanes, _mm512_permutex2var_ps(xy, _mm512_load_si512(kZ[i]), pz));
+  }
+}
+
+#else
+
+struct Mask {
+  Ints lanes;
+};
+FORGESCAN_INLINE unsigned Bits(Mask mask) {
+  unsigned bits = 0;
+  for (int i = 0; i < 4; ++i) {
+    __m128 four;
+    __builtin_memcpy(&four, reinterpret_cast<const char*>(&mask) + 16 * i, sizeof(four));
+    bits |= static_cast<unsigned>(_mm_movemask_ps(four)) << (4 * i);
+  }
+  return bits;
+}
+FORGESCAN_INLINE Mask FromBits(unsigned bits) {
+  constexpr Ints kBit = {1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1024, 2048, 4096, 8192, 16384, 32768};
+  return {((Ints{} + static_cast<int>(bits)) & kBit) != 0};
+}
+FORGESCAN_INLINE Mask Less(Floats a, Floats b) { return {a < b}; }
+FORGESCAN_INLINE Mask LessEqual(Floats a, Floats b) { return {a <= b}; }
+FORGESCAN_INLINE Mask Equal(Floats a, Floats b) { return {a == b}; }
+FORGESCAN_INLINE Floats Select(Mask mask, Floats yes, Floats no) {
+  return (Floats)(((Ints)yes & mask.lanes) | ((Ints)no & ~mask.lanes));
+}
+FORGESCAN_INLINE Ints CountUp(Ints count, Mask mask) { return count - mask.lanes; }
+FORGESCAN_INLINE Mask Above(Ints a, int limit) { return {a > limit}; }
+FORGESCAN_INLINE Floats Sqrt(Floats value) {
+  for (int i = 0; i < 4; ++i) {
+    __m128 four;
+    __builtin_memcpy(&four, reinterpret_cast<const char*>(&value) + 16 * i, sizeof(four));
+    four = _mm_sqrt_ps(four);
+    __builtin_memcpy(reinterpret_cast<char*>(&value) + 16 * i, &four, sizeof(four));
+  }
+  return value;
+}
+FORGESCAN_INLINE Floats LookUp(const float* from, Ints index) {
+  Floats value;
+  for (int i = 0; i < kLanes; ++i) {
+    value[i] = from[index[i]];
+  }
+  return value;
+}
+FORGESCAN_INLINE Floats LookUpNear(const float* from, Ints index) { return LookUp(from, index & 31); }
+FORGESCAN_INLINE void StorePacked(float* at, Mask mask, Floats value) {
+  const unsigned bits = Bits(mask);
+  for (int i = 0; i < kLanes; ++i) {
+    *at = value[i];
+    at += bits >> i & 1;
+  }
+}
+FORGESCAN_INLINE void StorePacked(float* at, Mask mask, Floats x, Floats y, Floats z) {
+  const unsigned bits = Bits(mask);
+  for (int i = 0; i < kLanes; ++i) {
+    at[0] = x[i];
+    at[1] = y[i];
+    at[2] = z[i];
+    at += 3 * (bits >> i & 1);
+  }
+}
+
+#endif
+
+FORGESCAN_INLINE Mask operator&(Mask a, Mask b) {
+#ifdef __AVX512F__
+  return {static_cast<__mmask16>(a.bits & b.bits)};
+#else
+  return {a.lanes & b.lanes};
+#endif
+}
+// a and not b
+FORGESCAN_INLINE Mask Without(Mask a, Mask b) {
+#ifdef __AVX512F__
+  return {static_cast<__mmask16>(a.bits & ~b.bits)};
+#else
+  return {a.lanes & ~b.lanes};
+#endif
+}
+FORGESCAN_INLINE Mask operator|(Mask a, Mask b) {
+#ifdef __AVX512F__
+  return {static_cast<__mmask16>(a.bits | b.bits)};
+#else
+  return {a.lanes | b.lanes};
+#endif
+}
+FORGESCAN_INLINE bool Any(Mask mask) { return Bits(mask) != 0; }
+FORGESCAN_INLINE long Count(Mask mask) { return __builtin_popcount(Bits(mask)); }
+FORGESCAN_INLINE Mask IsNumber(Floats value) { return Equal(value, value); }
+// The lanes whose two bytes are both 0.
+FORGESCAN_INLINE Mask BothZero(const std::uint8_t* a, const std::uint8_t* b) {
+  const __m128i either = _mm_or_si128(_mm_loadu_si128(reinterpret_cast<const __m128i*>(a)),
+                                      _mm_loadu_si128(reinterpret_cast<const __m128i*>(b)));
+  return FromBits(static_cast<unsigned>(_mm_movemask_epi8(_mm_cmpeq_epi8(either, _mm_setzero_si128()))));
+}
+
+}  // namespace
+}  // namespace forgescan

@@ -1,0 +1,211 @@
+// Disparities of a few rows -> the points of the middle one. See kernel.h.
+#pragma once
+
+#include "services/reconstruction/stereo/kernel.h"
+#include "services/reconstruction/stereo/lanes.h"
+#include "services/reconstruction/stereo/projector_lanes.h"
+
+namespace forgescan {
+namespace {
+
+// Sums over the columns of the window, and their moments about its middle row; NaN where a pixel is missing.
+FORGESCAN_INLINE void SumColumns(const PointTask& task, int radius) {
+  for (int x = 0; x < task.blocks * kLanes; x += kLanes) {
+    Floats sum = Load(task.rows[radius] + x);
+    Floats moment = {};
+    for (int k = 1; k <= radius; ++k) {
+      const Floats above = Load(task.rows[radius - k] + x), below = Load(task.rows[radius + k] + x);
+      sum += above + below;
+      moment += static_cast<float>(k) * (below - above);
+    }
+    Store(task.sums + x, sum);
+    Store(task.moments + x, moment);
+  }
+}
+
+struct Gradient {
+  Floats x, y;  // px per px along the raw columns and across the epipolar lines
+  Mask known;
+};
+
+// Least squares over a window without a missing pixel; known: whether it is that.
+FORGESCAN_INLINE Gradient FullGradient(const PointTask& task, int x, int radius) {
+  Floats along = {}, across = Load(task.moments + x);
+  float weight = 0;
+  for (int k = 1; k <= radius; ++k) {
+    along += static_cast<float>(k) * (Load(task.sums + x + k) - Load(task.sums + x - k));
+    across += Load(task.moments + x + k) + Load(task.moments + x - k);
+    weight += static_cast<float>(2 * k * k);
+  }
+  const float scale = 1 / (weight * static_cast<float>(2 * radius + 1));
+  return {along * scale, across * scale, IsNumber(along) & IsNumber(across)};
+}
+
+struct PairSum {
+  Floats step = {}, weight = {};
+
+  // Pixels 2 k apart that differ by no more than a surface seen flat would.
+  FORGESCAN_INLINE void Add(Floats low, Floats high, Floats slope_limit, float k) {
+    const Floats difference = high - low;
+    const Mask counts = LessEqual(Magnitude(difference), 2 * k * slope_limit);
+    step += Select(counts, k * difference, Floats{});
+    weight += Select(counts, All(2 * k * k), Floats{});
+  }
+};
+
+// Least squares over the symmetric pairs that are there; known: where they are a third of all.
+inline __attribute__((noinline)) Gradient PairGradient(const PointTask& task, int x,
+                                                       const PointGeometry& geometry) {
+  const int radius = geometry.radius_px;
+  const Floats limit = geometry.max_slope_per_disparity * Magnitude(Load(task.rows[radius] + x));
+  PairSum along, across;
+  float least = 0;
+  for (int k = 1; k <= radius; ++k) {
+    const auto weight = static_cast<float>(k);
+    for (int i = -radius; i <= radius; ++i) {
+      along.Add(Load(task.rows[radius + i] + x - k), Load(task.rows[radius + i] + x + k), limit, weight);
+      across.Add(Load(task.rows[radius - k] + x + i), Load(task.rows[radius + k] + x + i), limit, weight);
+    }
+    least += 2 * weight * weight * static_cast<float>(2 * radius + 1) / 3;
+  }
+  return {along.step / along.weight, across.step / across.weight,
+          LessEqual(All(least), along.weight) & LessEqual(All(least), across.weight)};
+}
+
+FORGESCAN_INLINE Gradient GradientAt(const PointTask& task, int x, Mask wanted, int radius,
+                                     const PointGeometry& geometry) {
+  Gradient gradient = FullGradient(task, x, radius);
+  if (Any(Without(wanted, gradient.known))) {
+    const Gradient pairs = PairGradient(task, x, geometry);
+    gradient.x = Select(gradient.known, gradient.x, pairs.x);
+    gradient.y = Select(gradient.known, gradient.y, pairs.y);
+    gradient.known = gradient.known | pairs.known;
+  }
+  return gradient;
+}
+
+// How the rectified column changes along the raw columns, and across the epipolar lines at one raw column.
+struct ColumnSlopes {
+  Floats along, across;
+};
+
+FORGESCAN_INLINE ColumnSlopes SlopesAt(const PointTask& task, int block) {
+  const EpipolarBlock& here = task.here[block];
+  const EpipolarBlock& above = task.above[block].row_count > 0 ? task.above[block] : here;
+  const EpipolarBlock& below = task.below[block].row_count > 0 ? task.below[block] : here;
+  const bool has_both = &above != &here && &below != &here;
+  const float across = (below.column[0] - above.column[0]) * (has_both ? 0.5F : 1.0F);
+  return {here.column[1] + 2 * here.column[2] * LaneNumbers(), All(across)};
+}
+
+// rows: the disparities around. Whether the surface falls off faster than the view angle allows from one
+// neighbour to the other: the pixel stands on a step. A missing neighbour says nothing.
+FORGESCAN_INLINE Mask IsOnStep(const float* const* rows, int x, Floats disparity,
+                               const PointGeometry& geometry) {
+  const Floats limit = 2 * geometry.max_slope_per_disparity * Magnitude(disparity);
+  const Floats along = Magnitude(Load(rows[0] + x + 1) - Load(rows[0] + x - 1));
+  const Floats across = Magnitude(Load(rows[1] + x) - Load(rows[-1] + x));
+  return Less(limit, along) | Less(limit, across);
+}
+
+struct SurfacePoint {
+  Floats x, y, z;     // ray, z = 1 times z
+  Floats nx, ny, nz;  // towards the camera
+  Floats ray_square;  // squared length of the ray to z = 1
+  Mask is_steep;
+  Mask good;
+};
+
+// A plane n.p = c has the disparity (f b / c) n.ray: its gradient over x, y is (b / c) (nx, ny), and n.ray =
+// d / f. All of it is multiplied by the slope of the columns, which saves a division.
+FORGESCAN_INLINE SurfacePoint PointOf(Floats column, Floats disparity, Floats depth, const Gradient& gradient,
+                                      const ColumnSlopes& slopes, const PointGeometry& geometry) {
+  const float inverse_focal = 1 / geometry.focal_px;
+  const Floats x = column * inverse_focal;
+  const float y = geometry.row_px * inverse_focal;
+  const Floats along_ray = disparity * inverse_focal * slopes.along;
+  const Floats gx = gradient.x;
+  const Floats gy = gradient.y * slopes.along - gradient.x * slopes.across;
+  const Floats gz = along_ray - gx * x - gy * y;
+  const Floats square = gx * gx + gy * gy + gz * gz;
+  const Floats ray_square = x * x + (y * y + 1);
+  const Floats length = Select(Less(Floats{}, along_ray), -InverseSqrt(square), InverseSqrt(square));
+  return {.x = depth * x,
+          .y = depth * y,
+          .z = depth,
+          .nx = gx * length,
+          .ny = gy * length,
+          .nz = gz * length,
+          .ray_square = ray_square,
+          .is_steep = Less(along_ray * along_ray, geometry.squared_min_cosine * square * ray_square),
+          .good = FromBits(0)};
+}
+
+// Those of the points that the projector could have lit by the column they show; notes by how much they are
+// off.
+inline __attribute__((noinline)) Mask CheckWithProjector(const PointTask& task, int x,
+                                                         const SurfacePoint& point,
+                                                         const PointGeometry& geometry, PointRow& points) {
+  const ProjectorModel& model = *geometry.projector;
+  const Floats shown = geometry.sign * Load(task.left->coordinate_px + x);
+  const Floats residual = shown - ProjectorColumn(model, point.x, point.y, point.z);
+  StorePacked(points.residual_px + points.residual_count, point.good, residual);
+  points.residual_count += static_cast<int>(Count(point.good));
+  const Floats variance = Load(task.left->variance_px2 + x);
+  const Floats square = residual * residual;
+  const Mask lit = LessEqual(square, All(model.max_residual_px * model.max_residual_px)) |
+                   LessEqual(square, model.max_residual_sigma * model.max_residual_sigma * variance);
+  points.projector += Count(Without(point.good, lit));
+  return point.good & lit;
+}
+
+FORGESCAN_INLINE void PointBlock(const PointTask& task, int block, int radius, const PointGeometry& geometry,
+                                 PointRow& points) {
+  const int x = block * kLanes;
+  const Floats disparity = Load(task.rows[radius] + x);
+  const Mask matched = IsNumber(disparity);
+  if (!Any(matched)) {
+    return;
+  }
+  const Floats depth = geometry.focal_times_baseline / disparity;
+  const Mask in_range =
+      matched & LessEqual(All(geometry.min_depth_mm), depth) & LessEqual(depth, All(geometry.max_depth_mm));
+  const Gradient gradient = GradientAt(task, x, in_range, radius, geometry);
+  const Mask has_normal = in_range & gradient.known;
+  SurfacePoint point =
+      PointOf(Load(task.left->column_px + x), disparity, depth, gradient, SlopesAt(task, block), geometry);
+  point.good = Without(has_normal, point.is_steep | IsOnStep(task.rows + radius, x, disparity, geometry));
+  const Mask good =
+      geometry.projector != nullptr ? CheckWithProjector(task, x, point, geometry, points) : point.good;
+  const Floats variance = Load(task.disparity->variance_px2 + x);
+  const Floats sigma = Magnitude(depth / disparity) * Sqrt(variance * point.ray_square);
+  const int at = points.count;
+  StorePacked(points.points_mm + 3 * at, good, point.x, point.y, point.z);
+  StorePacked(points.normals + 3 * at, good, point.nx, point.ny, point.nz);
+  StorePacked(points.sigma_mm + at, good, sigma);
+  StorePacked(points.coordinate_px + at, good, Load(task.left->coordinate_px + x));
+  points.count += static_cast<int>(Count(good));
+  points.depth_range += Count(Without(matched, in_range));
+  points.no_normal += Count(Without(in_range, has_normal));
+  points.steep += Count(Without(has_normal, point.good));
+}
+
+FORGESCAN_INLINE void PointBlocks(const PointTask& task, int radius, const PointGeometry& geometry,
+                                  PointRow& points) {
+  SumColumns(task, radius);
+  for (int block = 0; block < task.blocks; ++block) {
+    PointBlock(task, block, radius, geometry, points);
+  }
+}
+
+inline void TriangulateRow(const PointTask& task, const PointGeometry& geometry, PointRow& points) {
+  constexpr int kUsual = 3;  // with its loops unrolled
+  if (geometry.radius_px == kUsual) {
+    PointBlocks(task, kUsual, geometry, points);
+  } else {
+    PointBlocks(task, geometry.radius_px, geometry, points);
+  }
+}
+
+}  // namespace
+}  // namespace forgescan

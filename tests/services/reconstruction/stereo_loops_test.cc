@@ -1,0 +1,135 @@
+// Sampling and normals of stereo: what they do, and that every instruction set does the same to the last bit.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <random>
+
+#include "services/reconstruction/stereo/kernel.h"
+#include "services/reconstruction/stereo/row_arrays.h"
+
+namespace forgescan {
+namespace {
+
+constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+constexpr float kVariance = 0.0004F;
+using Row = std::vector<float>;
+
+const StereoKernel& Plain() { return *StereoKernels().back(); }
+
+// Lines that slant through an image of odd width, with masked pixels, jumps and lines that leave the image.
+Row SampleAll(const StereoKernel& kernel) {
+  constexpr int kWidth = 53, kHeight = 20, kBlocks = 4;
+  std::mt19937 random(9);
+  std::uniform_real_distribution<float> uniform(0, 1);
+  std::vector<float> coordinate(kWidth * kHeight), sigma(kWidth * kHeight);
+  std::vector<std::uint8_t> cause(kWidth * kHeight);
+  for (std::size_t i = 0; i < coordinate.size(); ++i) {
+    coordinate[i] =
+        static_cast<float>(i % kWidth) + 0.1F * uniform(random) + (uniform(random) > 0.95F ? 9.0F : 0.0F);
+    sigma[i] = 0.02F + 0.01F * uniform(random);
+    cause[i] = uniform(random) > 0.9F ? 3 : 0;
+  }
+  const RawView view = {
+      coordinate.data(), sigma.data(), cause.data(), kWidth, kWidth, kWidth, kWidth, kHeight, 3, -1};
+  Row all;
+  for (int row = -2; row < kHeight; ++row) {
+    std::vector<EpipolarBlock> blocks(kBlocks);
+    for (int b = 0; b < kBlocks; ++b) {
+      const auto begin = static_cast<float>(row) + 0.3F + 1.6F * static_cast<float>(b);
+      blocks[static_cast<std::size_t>(b)] = {
+          {begin, 0.1F, 0.001F}, {static_cast<float>(16 * b), 1.01F, 0.0001F}, 0, kHeight - 1};
+    }
+    RowArrays arrays(3, kBlocks * kStereoLanes);
+    PreparedRow prepared(kBlocks, arrays[0], arrays[1], arrays[2]);
+    kernel.sample(view, blocks.data(), prepared.row());
+    for (int x = 0; x < kWidth; ++x) {
+      all.push_back(prepared.row().raw_px[x]);
+      all.push_back(prepared.row().variance_px2[x]);
+      all.push_back(prepared.row().column_px[x]);
+    }
+  }
+  return all;
+}
+
+TEST(StereoKernel, SamplesBetweenValidRowsOnly) {
+  const Row plain = SampleAll(Plain());
+  const auto numbers = std::count_if(plain.begin(), plain.end(), [](float v) { return !std::isnan(v); });
+  EXPECT_LT(numbers, std::ssize(plain));
+  EXPECT_GT(numbers, std::ssize(plain) / 2);
+  for (std::size_t i = 0; i < plain.size(); i += 3) {
+    ASSERT_TRUE(std::isnan(plain[i]) || (plain[i] <= 0 && plain[i] > -64))
+        << i;  // sign -1; 9 px jumps are not mixed in
+  }
+  for (const StereoKernel* kernel : StereoKernels()) {
+    const Row other = SampleAll(*kernel);
+    EXPECT_EQ(std::memcmp(plain.data(), other.data(), plain.size() * sizeof(float)), 0) << kernel->name;
+  }
+}
+
+// Disparities of a plane with holes and a step, 9 rows of 64.
+Row TriangulateAll(const StereoKernel& kernel, bool with_holes) {
+  constexpr int kRows = 9, kBlocks = 4, kCount = kBlocks * kStereoLanes, kRoom = kCount + kStereoLanes;
+  RowArrays disparities(kRows, kCount), scratch(6, kCount);
+  for (int y = 0; y < kRows; ++y) {
+    for (int x = 0; x < kCount; ++x) {
+      const bool hole = with_holes && ((x + 3 * y) % 11 == 0 || (x > 30 && x < 33));
+      disparities[y][x] = hole ? kNan : 200 + 0.05F * static_cast<float>(x) - 0.02F * static_cast<float>(y);
+    }
+  }
+  PreparedRow left(kBlocks, scratch[0], scratch[1], scratch[2]);
+  std::vector<EpipolarBlock> blocks(kBlocks);
+  for (int x = 0; x < kCount; ++x) {
+    scratch[0][x] = scratch[2][x] = static_cast<float>(x - 32);
+    scratch[1][x] = scratch[3][x] = kVariance;
+    blocks[static_cast<std::size_t>(x / kStereoLanes)] = {
+        {4, 0, 0}, {static_cast<float>(x / 16 * 16 - 32), 1, 0}, 4, 1};
+  }
+  std::vector<const float*> rows;
+  for (int y = 1; y < kRows - 1; ++y) {
+    rows.push_back(disparities[y]);
+  }
+  const DisparityRow disparity = {disparities[4], scratch[3]};
+  Row out(9 * kRoom, 0);
+  float* const at = out.data();
+  PointRow points = {at, at + 3 * kRoom, at + 6 * kRoom, at + 7 * kRoom, at + 8 * kRoom, 0, 0, 0, 0, 0, 0};
+  kernel.triangulate({rows.data(), &left.row(), &disparity, blocks.data(), blocks.data(), blocks.data(),
+                      scratch[4], scratch[5], kBlocks},
+                     {1000, 100000, 5, 50, 10000, 0.117F, 0.003F, 3, 1, nullptr}, points);
+  // Behind the points stands whatever was packed last.
+  std::fill(at + 3 * points.count, at + 3 * kRoom, 0.0F);
+  std::fill(at + 3 * kRoom + 3 * points.count, at + 6 * kRoom, 0.0F);
+  for (int i = 6; i < 9; ++i) {
+    std::fill(at + i * kRoom + points.count, at + (i + 1) * kRoom, 0.0F);
+  }
+  out.push_back(static_cast<float>(points.count));
+  out.push_back(static_cast<float>(points.no_normal));
+  return out;
+}
+
+TEST(StereoKernel, NormalsOfAPlaneAreItsNormalWithHolesOrWithout) {
+  constexpr int kRoom = 80;
+  for (const bool with_holes : {false, true}) {
+    const Row plain = TriangulateAll(Plain(), with_holes);
+    const auto count = static_cast<int>(plain[plain.size() - 2]);
+    EXPECT_GT(count, with_holes ? 40 : 55);
+    // d = (f b / c) n.ray: n is along (gx, gy, d/f - gx x - gy y) of any of the pixels.
+    const double gx = 0.05, gy = -0.02, gz = (200 + 0.05 * 32 - 0.02 * 4) / 1000 - gy * 5 / 1000;
+    const double length = std::sqrt(gx * gx + gy * gy + gz * gz);
+    for (int i = 0; i < count; ++i) {
+      const float* const normal = plain.data() + 3 * kRoom + 3 * i;
+      ASSERT_NEAR(normal[0], -gx / length, 2e-5) << i;  // float disparities of 200 px: 1.5e-5 px
+      ASSERT_NEAR(normal[1], -gy / length, 2e-5) << i;
+      ASSERT_NEAR(normal[2], -gz / length, 2e-5) << i;
+    }
+    for (const StereoKernel* kernel : StereoKernels()) {
+      const Row other = TriangulateAll(*kernel, with_holes);
+      EXPECT_EQ(std::memcmp(plain.data(), other.data(), plain.size() * sizeof(float)), 0) << kernel->name;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace forgescan
