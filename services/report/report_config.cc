@@ -26,6 +26,7 @@ void ReadBudget(ConfigTable table, UncertaintyBudget& budget) {
   table.Optional("robot_turn_rad", budget.robot_turn_rad, 0.0, 0.1);
   table.Optional("refraction_mm", budget.refraction_mm, 0.0, 10.0);
   table.Optional("patch_mm", budget.patch_mm, 0.0, 10.0);
+  table.Optional("surface_mm", budget.surface_mm, 0.0, 10.0);
   table.Optional("scanner_scale", budget.scanner_scale, 0.0, 0.1);
   table.Optional("temperature_k", budget.temperature_k, 0.0, 200.0);
   table.Optional("view_temperature_k", budget.view_temperature_k, 0.0, 200.0);

@@ -16,6 +16,7 @@ Status CheckTerm(const char* name, double value, double max) {
 
 Influence BetweenTwoViews(double size_mm) {
   Influence influence;
+  influence.outward = 2;
   for (const double side : {-1.0, 1.0}) {
     ViewInfluence view;
     view.view = side < 0 ? 0 : 1;
@@ -45,6 +46,7 @@ Status UncertaintyBudget::Check() const {
   RETURN_IF_ERROR(CheckTerm("robot_turn_rad", robot_turn_rad, 0.1));
   RETURN_IF_ERROR(CheckTerm("refraction_mm", refraction_mm, 10.0));
   RETURN_IF_ERROR(CheckTerm("patch_mm", patch_mm, 10.0));
+  RETURN_IF_ERROR(CheckTerm("surface_mm", surface_mm, 10.0));
   RETURN_IF_ERROR(CheckTerm("scanner_scale", scanner_scale, 0.1));
   RETURN_IF_ERROR(CheckTerm("temperature_k", temperature_k, 200.0));
   RETURN_IF_ERROR(CheckTerm("view_temperature_k", view_temperature_k, 200.0));
@@ -68,6 +70,7 @@ std::vector<UncertaintyTerm> UncertaintyTerms(const UncertaintyBudget& budget, c
           {"view matrices", OfViews(used, budget.view_shift_mm, budget.view_turn_rad)},
           {"robot", OfViews(used, budget.robot_shift_mm, budget.robot_turn_rad)},
           {"refraction", OfViews(used, budget.refraction_mm, 0)},
+          {"height of the surface", budget.surface_mm * std::abs(used.outward)},
           {"scale of the scanner", budget.scanner_scale * std::abs(scale_mm)},
           {"temperature of the part", slope * budget.temperature_k * std::abs(stretch_mm)},
           {"temperature between views", slope * budget.view_temperature_k * std::sqrt(stretch_squares)}};

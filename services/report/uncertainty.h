@@ -19,6 +19,7 @@ struct UncertaintyBudget {
   double robot_turn_rad = 0.000024;
   double refraction_mm = 0.02;  // of a view, by hot air; an assumption until it is measured
   double patch_mm = 0.01;       // of a patch of a view: what does not average out between neighbouring points
+  double surface_mm = 0.015;    // height of every point over the surface, all views alike: calibration, glow
   double scanner_scale = 0.0002;    // relative, of every view about its middle
   double temperature_k = 2.4;       // of the part, common to all views: pyrometer, cooling within the part
   double view_temperature_k = 0.5;  // of the part at one view

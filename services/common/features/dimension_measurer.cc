@@ -118,7 +118,9 @@ class Measurer {
           1.0 / static_cast<double>(size.first.size()) + 1.0 / static_cast<double>(size.second.size());
     }
     const auto count = static_cast<double>(sizes.size());
-    Gather(WeighTwoPoint(seen.points, fit, sizes), seen, {}, CylinderFit::kUnknowns);
+    // A local size contains the form of its place: there is no form that it misses.
+    const WeighedPoints weighed = WeighTwoPoint(seen.points, fit, sizes);
+    Gather(weighed, seen, weighed, CylinderFit::kUnknowns);
     made_.definition = fmt::format("{} (ISO 14405-1): two-point size in {} sections",
                                    SizeDefinitionName(spec.definition), spec.sections_mm.size());
     made_.uncertainty_mm = fit.quality.sigma_mm * std::sqrt(variance) / count;

@@ -18,6 +18,7 @@ struct ViewInfluence {
 
 struct Influence {
   std::vector<ViewInfluence> views;  // ascending
+  double outward = 0;                // mm per mm by which every point lies too high over the surface
   double noise_mm = 0;  // standard uncertainty from errors of single points, of the size they scatter by
   double form_mm = 0;   // standard uncertainty from the form of what was not seen, or seen unevenly
   double patch = 0;     // mm per mm of error that a patch of one view shares, the patches being independent

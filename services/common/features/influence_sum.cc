@@ -135,6 +135,7 @@ void InfluenceSum::AddViews(const WeighedPoints& seen) {
     const Eigen::Vector3d middle = view < middles_.size() ? middles_[view] : Eigen::Vector3d::Zero();
     const Eigen::Vector3d push = seen.weights[i] * seen.normals[i];
     const Eigen::Vector3d arm = seen.points[i] - middle;
+    outward_ += seen.weights[i];
     sum.shift += push;
     sum.turn_mm += arm.cross(push);
     sum.scale_mm += push.dot(arm);
@@ -173,6 +174,7 @@ void InfluenceSum::AddForm(const WeighedPoints& seen, const WeighedPoints& ideal
 Influence InfluenceSum::Take() const {
   Influence influence;
   for (const auto& [view, sum] : views_) influence.views.push_back(sum);
+  influence.outward = outward_;
   influence.noise_mm = std::sqrt(noise_mm2_);
   influence.form_mm = std::sqrt(form_mm2_);
   influence.patch = std::sqrt(patch2_);

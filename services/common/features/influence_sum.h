@@ -57,7 +57,7 @@ class InfluenceSum {
   std::span<const Eigen::Vector3d> middles_;
   InfluenceOptions options_;
   std::map<std::uint16_t, ViewInfluence> views_;
-  double noise_mm2_ = 0, form_mm2_ = 0, patch2_ = 0;
+  double outward_ = 0, noise_mm2_ = 0, form_mm2_ = 0, patch2_ = 0;
 };
 
 // The mean of every view's points; zero for a view without points. Shape: one entry for each number up to the

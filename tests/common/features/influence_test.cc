@@ -135,6 +135,7 @@ TEST_F(InfluenceTest, CommonMovesCancelAndACommonStretchIsTheSize) {
       shift += view.shift;
       stretch_mm += view.stretch_mm;
     }
+    EXPECT_NEAR(result.influence.outward, 2, 0.01) << result.name;  // out on both sides
     EXPECT_LT(shift.norm(), 0.01) << result.name;  // the planes' normals differ by some 1e-3 rad
     EXPECT_NEAR(stretch_mm, *result.measured_mm, 0.005 * *result.measured_mm) << result.name;
   }

@@ -249,12 +249,14 @@ class Simulation {
   PointCloud Scan(const Part& part, Draw& draw) const {
     const UncertaintyBudget& budget = options_.budget;
     const double scale = draw.Normal(budget.scanner_scale), warmth_k = draw.Normal(budget.temperature_k);
+    const double height_mm = draw.Normal(budget.surface_mm);
     PointCloud cloud;
     for (std::size_t v = 0; v < views_.size(); ++v) {
       const ViewError error =
           ViewError::Make(draw, budget, scale, warmth_k, influence_.patch_cell_mm / kCellPerLength);
       for (const SurfacePoint& at : views_[v].points) {
-        const double off_mm = at.face < 0 ? 0 : draw.Normal(options_.noise_mm) + error.patches.At(at.point);
+        const double off_mm =
+            at.face < 0 ? 0 : height_mm + draw.Normal(options_.noise_mm) + error.patches.At(at.point);
         cloud.points.push_back(
             error.Move(part.Place(at) + off_mm * at.normal, views_[v].middle).cast<float>());
         cloud.normals.push_back(at.normal.cast<float>());
