@@ -15,7 +15,7 @@ struct CoverageOptions {
   std::uint64_t seed = 1;
   unsigned threads = 0;  // 0: as many as the host has; the result does not depend on it
   UncertaintyBudget budget;
-  std::size_t surface_points = 300'000;  // over the whole part, from which each view sees its share
+  std::size_t surface_points = 100'000;  // over the whole part, from which each view sees its share
   double noise_mm = 0.03;                // of single points
   double form_mm = 0.05;                 // of the forged faces, standard deviation
 };

@@ -23,7 +23,7 @@ void ExpectCoverage(const std::vector<Coverage>& coverage, int parts) {
 TEST(CoverageTest, Starts) {
   CoverageOptions options;
   options.parts = 1;
-  options.surface_points = 100'000;
+  options.surface_points = 60'000;
   const auto coverage = SimulateCoverage(options);
   ASSERT_TRUE(coverage.ok()) << coverage.error().message;
   EXPECT_EQ(coverage->size(), 5U);
@@ -32,7 +32,7 @@ TEST(CoverageTest, Starts) {
 TEST(CoverageTest, IntervalsHoldTheTruthAsOftenAsStated) {
   CoverageOptions options;
   options.parts = 60;
-  options.surface_points = 150'000;
+  options.surface_points = 60'000;
   const auto coverage = SimulateCoverage(options);
   ASSERT_TRUE(coverage.ok()) << coverage.error().message;
   std::fputs(CoverageTable(*coverage).c_str(), stdout);
@@ -47,7 +47,7 @@ TEST(CoverageTest, IntervalsHoldTheTruthAsOftenAsStated) {
 TEST(CoverageTest, AnErrorThatIsNotStatedShows) {
   CoverageOptions options;
   options.parts = 20;
-  options.surface_points = 100'000;
+  options.surface_points = 60'000;
   const auto honest = SimulateCoverage(options);
   options.budget.refraction_mm *= 5;
   const auto rough = SimulateCoverage(options);
