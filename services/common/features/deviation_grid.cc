@@ -10,8 +10,7 @@ namespace {
 constexpr std::size_t kLeastLeaves = 512;  // with fewer the tree is as quick
 constexpr std::size_t kMostCells = 4'000'000;
 constexpr std::size_t kMostNodes = 12;  // of a cell; with more the tree is as quick
-constexpr float kBandCells = 3;         // cells whose middle is farther from the surface have no list
-constexpr double kCellPerLeaf = 0.5;    // of the mean diagonal of a leaf: a list then fills one or two nodes
+constexpr float kBandCells = 2;         // cells whose middle is farther from the surface have no list
 constexpr float kRounding_mm = 1e-3F;
 constexpr float kBoxRounding_mm = 1e-3F;
 constexpr float kRootOf3 = 1.7320508F;
@@ -47,7 +46,7 @@ class DeviationSurface::GridBuilder {
   inline static const Eigen::AlignedBox3f kNowhere{Eigen::Vector3f::Constant(kFarAway_mm),
                                                    Eigen::Vector3f::Constant(kFarAway_mm)};
 
-  // Cells smaller than the leaves; all over the surface and a little about it.
+  // Cells about as large as the leaves; all over the surface and a little about it.
   void PlaceCells() {
     Eigen::AlignedBox3f box;
     double leaf_mm = 0;
@@ -60,7 +59,7 @@ class DeviationSurface::GridBuilder {
       }
     }
     leaf_mm /= static_cast<double>(surface_.leaves_.size());
-    cell_mm_ = static_cast<float>(std::max(kCellPerLeaf * leaf_mm, 1e-3));
+    cell_mm_ = static_cast<float>(std::max(leaf_mm, 1e-3));
     for (;; cell_mm_ *= 1.25F) {
       grid_.low = box.min().array() - kBandCells * cell_mm_;
       const Eigen::Array3f cells = (box.sizes().array() + 2 * kBandCells * cell_mm_) / cell_mm_;
