@@ -133,7 +133,7 @@ TEST(Layout, VendorHeadersStayInTheirFiles) {
       {std::regex("^arv\\.h$"), std::regex("^drivers/camera/\\w+\\.cc$|^tests/drivers/camera/")},
       {std::regex("^linux/can"), std::regex("^drivers/can/can_socketcan\\.cc$")},
       {std::regex("^sqlite3\\.h$"), std::regex("^services/report/|^tests/services/report/")},
-      {std::regex("^embree"), std::regex("^tools/virtual_station/\\w+\\.cc$")},
+      {std::regex("^embree"), std::regex("^tools/virtual_station/\\w+\\.cc$|^tests/bench/")},
       {std::regex("^(BRep|TopoDS|STEP|XCAF|gp_)"),
        std::regex("\\.cc$|_shape\\.h$")},  // private headers of shapes
   };

@@ -52,9 +52,13 @@ JudgedDimension Judge(const MeasuredDimension& from, const UncertaintyBudget& bu
   to.measured_mm = *from.measured_mm;
   to.deviation_mm = to.measured_mm - to.nominal_mm;
   to.temperature_degc = cloud_degc;
-  to.uncertainty_mm = from.expanded_uncertainty_mm.has_value()
-                          ? *from.expanded_uncertainty_mm
-                          : ExpandedUncertaintyMm(budget, to.measured_mm, from.fit_uncertainty_mm);
+  to.definition = from.definition;
+  if (from.expanded_uncertainty_mm.has_value()) {
+    to.uncertainty_mm = *from.expanded_uncertainty_mm;
+  } else {
+    to.uncertainty_terms = UncertaintyTerms(budget, from.influence, to.measured_mm, from.fit_uncertainty_mm);
+    to.uncertainty_mm = ExpandedUncertaintyMm(to.uncertainty_terms);
+  }
   to.verdict = JudgeSize(to.measured_mm, to.uncertainty_mm, to.lower_mm, to.upper_mm);
   if (to.verdict == Verdict::kNotInspected) {
     to.reason = "The limits or the stated uncertainty of this dimension cannot be used.";

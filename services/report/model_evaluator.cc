@@ -2,14 +2,12 @@
 
 #include <thread>
 
-#include "services/common/features/select_points.h"
 #include "services/common/model/bundle_file.h"
 
 namespace forgescan {
 
-ModelEvaluator::ModelEvaluator(ModelBundle model, Features features, TriangleIndex index,
-                               const DimensionOptions& options)
-    : model_(std::move(model)), features_(std::move(features)), index_(std::move(index)), options_(options) {}
+ModelEvaluator::ModelEvaluator(DimensionEvaluator dimensions, DeviationSurface surface)
+    : dimensions_(std::move(dimensions)), surface_(std::move(surface)) {}
 
 Result<std::unique_ptr<ModelEvaluator>> ModelEvaluator::Load(const std::string& bundle_path,
                                                              const std::string& features_path,
@@ -22,20 +20,21 @@ Result<std::unique_ptr<ModelEvaluator>> ModelEvaluator::Load(const std::string& 
 Result<std::unique_ptr<ModelEvaluator>> ModelEvaluator::Make(ModelBundle model, Features features,
                                                              const DimensionOptions& options) {
   ASSIGN_OR_RETURN(Features bound, BindFeatures(std::move(features), model));
-  ASSIGN_OR_RETURN(TriangleIndex index, TriangleIndex::Build(model.vertices, model.triangles));
-  return std::unique_ptr<ModelEvaluator>(
-      new ModelEvaluator(std::move(model), std::move(bound), std::move(index), options));
+  ASSIGN_OR_RETURN(DeviationSurface surface, DeviationSurface::Build(model.vertices, model.triangles));
+  ASSIGN_OR_RETURN(DimensionEvaluator dimensions,
+                   DimensionEvaluator::Build(std::move(model), std::move(bound), options));
+  return std::unique_ptr<ModelEvaluator>(new ModelEvaluator(std::move(dimensions), std::move(surface)));
 }
 
 std::vector<MeasuredDimension> ModelEvaluator::Dimensions() const {
   std::vector<MeasuredDimension> dimensions;
-  for (const DimensionSpec& spec : features_.dimensions) {
+  for (const DimensionSpec& spec : dimensions_.features().dimensions) {
     MeasuredDimension dimension;
     dimension.name = spec.name;
     dimension.nominal_mm = spec.nominal_mm;
     dimension.lower_mm = spec.lower_mm;
     dimension.upper_mm = spec.upper_mm;
-    dimension.reference_degc = features_.reference_temperature_degc;
+    dimension.reference_degc = dimensions_.features().reference_temperature_degc;
     dimension.expanded_uncertainty_mm = spec.expanded_uncertainty_mm;
     dimensions.push_back(std::move(dimension));
   }
@@ -43,8 +42,7 @@ std::vector<MeasuredDimension> ModelEvaluator::Dimensions() const {
 }
 
 Result<std::vector<MeasuredDimension>> ModelEvaluator::Evaluate(const PointCloud& cloud_in_model) const {
-  ASSIGN_OR_RETURN(const std::vector<DimensionResult> results,
-                   EvaluateDimensions(cloud_in_model, model_, features_, options_));
+  ASSIGN_OR_RETURN(const std::vector<DimensionResult> results, dimensions_.Evaluate(cloud_in_model));
   std::vector<MeasuredDimension> dimensions = Dimensions();
   if (results.size() != dimensions.size()) {
     return Fail(ErrorCode::kUntrusted, "{} of {} dimensions were evaluated", results.size(),
@@ -52,6 +50,8 @@ Result<std::vector<MeasuredDimension>> ModelEvaluator::Evaluate(const PointCloud
   }
   for (std::size_t i = 0; i < results.size(); ++i) {
     dimensions[i].measured_mm = results[i].measured_mm;
+    dimensions[i].definition = results[i].definition;
+    dimensions[i].influence = results[i].influence;
     dimensions[i].fit_uncertainty_mm = results[i].standard_uncertainty_mm;
     dimensions[i].points = static_cast<int>(results[i].points);
     dimensions[i].rejected_share = results[i].removed_share;
@@ -61,7 +61,7 @@ Result<std::vector<MeasuredDimension>> ModelEvaluator::Evaluate(const PointCloud
 }
 
 Result<std::vector<float>> ModelEvaluator::DeviationsMm(const PointCloud& cloud_in_model) const {
-  return SignedDeviations(cloud_in_model, index_, kMaxDeviationMm, std::thread::hardware_concurrency());
+  return SignedDeviations(cloud_in_model, surface_, kMaxDeviationMm, std::thread::hardware_concurrency());
 }
 
 }  // namespace forgescan

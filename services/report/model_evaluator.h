@@ -4,8 +4,8 @@
 #include <memory>
 #include <string>
 
+#include "services/common/features/deviation_surface.h"
 #include "services/common/features/dimensions.h"
-#include "services/common/geometry/triangle_index.h"
 #include "services/common/model/features.h"
 #include "services/common/model/model_bundle.h"
 #include "services/report/part_evaluator.h"
@@ -18,7 +18,7 @@ class ModelEvaluator final : public PartEvaluator {
   static Result<std::unique_ptr<ModelEvaluator>> Load(const std::string& bundle_path,
                                                       const std::string& features_path,
                                                       const DimensionOptions& options);
-  // Errors: as BindFeatures and TriangleIndex::Build.
+  // Errors: as BindFeatures, DimensionEvaluator::Build and DeviationSurface::Build.
   static Result<std::unique_ptr<ModelEvaluator>> Make(ModelBundle model, Features features,
                                                       const DimensionOptions& options);
 
@@ -26,17 +26,17 @@ class ModelEvaluator final : public PartEvaluator {
   Result<std::vector<MeasuredDimension>> Evaluate(const PointCloud& cloud_in_model) const override;
   // NaN for a point further than kMaxDeviationMm from the model.
   Result<std::vector<float>> DeviationsMm(const PointCloud& cloud_in_model) const override;
-  const std::vector<Eigen::Vector3f>& ModelPoints() const override { return model_.sample_points; }
+  const std::vector<Eigen::Vector3f>& ModelPoints() const override {
+    return dimensions_.model().sample_points;
+  }
 
   static constexpr double kMaxDeviationMm = 20.0;
 
  private:
-  ModelEvaluator(ModelBundle model, Features features, TriangleIndex index, const DimensionOptions& options);
+  ModelEvaluator(DimensionEvaluator dimensions, DeviationSurface surface);
 
-  ModelBundle model_;
-  Features features_;
-  TriangleIndex index_;
-  DimensionOptions options_;
+  DimensionEvaluator dimensions_;
+  DeviationSurface surface_;
 };
 
 }  // namespace forgescan

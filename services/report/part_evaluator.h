@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "services/common/features/influence.h"
 #include "services/common/geometry/point_cloud.h"
 #include "services/common/result.h"
 
@@ -19,7 +20,9 @@ struct MeasuredDimension {
   double reference_degc = 0.0;                    // for which the limits hold
   std::optional<double> expanded_uncertainty_mm;  // stated in the features file, in place of the budget's
   std::optional<double> measured_mm;              // nothing when not determined; then `reason` says why
+  std::string definition;                         // what was measured
   double fit_uncertainty_mm = 0.0;                // standard uncertainty from the fits; NaN when not known
+  Influence influence;  // of errors of views, points and faces; empty when not known
   int points = 0;
   double rejected_share = 0.0;  // 0..1
   // Without a measured value: why. With one: what speaks against trusting it; the verdict is NOT_DECIDABLE.

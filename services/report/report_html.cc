@@ -98,6 +98,28 @@ std::string Dimensions(const PartReport& report) {
   return Section("Dimensions", table + "</tbody></table>\n");
 }
 
+// One row a contribution, one column a dimension whose uncertainty was computed.
+std::string Uncertainties(const PartReport& report) {
+  std::vector<const JudgedDimension*> columns;
+  for (const JudgedDimension& dimension : report.dimensions) {
+    if (!dimension.uncertainty_terms.empty()) columns.push_back(&dimension);
+  }
+  if (columns.empty()) return "";
+  std::string table = "<table><thead><tr><th class=\"t\">Standard uncertainty, mm</th>";
+  for (const JudgedDimension* column : columns) table += "<th>" + EscapeHtml(column->name) + "</th>";
+  table += "</tr></thead><tbody>\n";
+  for (std::size_t i = 0; i < columns.front()->uncertainty_terms.size(); ++i) {
+    table += "<tr>" + TextCell(EscapeHtml(columns.front()->uncertainty_terms[i].name));
+    for (const JudgedDimension* column : columns) {
+      table += Cell(NumberText(column->uncertainty_terms[i].standard_mm, 4));
+    }
+    table += "</tr>\n";
+  }
+  table += "<tr>" + TextCell("U (k&nbsp;=&nbsp;2)");
+  for (const JudgedDimension* column : columns) table += Cell(NumberText(column->uncertainty_mm, 4));
+  return Section("Uncertainty", table + "</tr></tbody></table>\n");
+}
+
 std::string Picture(const PartReport& report) {
   if (report.deviation_picture.empty()) {
     return Section("Deviation from the design model",
@@ -214,9 +236,10 @@ std::string IndexRow(const PartRecord& part) {
 
 std::string ReportHtml(const PartReport& report) {
   return Page(fmt::format("Part {}: {}", report.part, VerdictLabel(report.verdict.verdict)),
-              Header(report) + Overview(report) + Dimensions(report) + Picture(report) + Trends(report) +
-                  Views(report) + "<div class=\"pair\">" + Registration(report.registration) +
-                  TimingAndCounters(report) + "</div>\n" + Footer(report));
+              Header(report) + Overview(report) + Dimensions(report) + Uncertainties(report) +
+                  Picture(report) + Trends(report) + Views(report) + "<div class=\"pair\">" +
+                  Registration(report.registration) + TimingAndCounters(report) + "</div>\n" +
+                  Footer(report));
 }
 
 std::string IndexHtml(const std::string& station, std::span<const PartRecord> parts) {

@@ -16,6 +16,15 @@ Json Count(const std::optional<std::int64_t>& value) {
 }
 Json Time(std::int64_t utime) { return utime > 0 ? Json(utime) : Json(nullptr); }
 
+// Standard uncertainties, by what they come from; their root of squares times 2 is uncertainty_mm.
+Json Contributions(const std::vector<UncertaintyTerm>& terms) {
+  Json list = Json::array();
+  for (const UncertaintyTerm& term : terms) {
+    list.push_back({{"name", term.name}, {"standard_mm", Number(term.standard_mm)}});
+  }
+  return list;
+}
+
 Json Dimension(const JudgedDimension& from) {
   return {{"name", from.name},
           {"nominal_mm", Number(from.nominal_mm)},
@@ -26,6 +35,8 @@ Json Dimension(const JudgedDimension& from) {
           {"temperature_degc", Number(from.temperature_degc)},
           {"verdict", VerdictText(from.verdict)},
           {"uncertainty_mm", Number(from.uncertainty_mm)},
+          {"definition", from.definition},
+          {"uncertainty_contributions", Contributions(from.uncertainty_terms)},
           {"points", from.points},
           {"rejected_share", Number(from.rejected_share)},
           {"reason", from.reason}};

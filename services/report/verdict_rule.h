@@ -8,6 +8,8 @@
 #include <string_view>
 #include <vector>
 
+#include "services/report/uncertainty.h"
+
 namespace forgescan {
 
 // Same numbers as verdict_t.VERDICT_*.
@@ -25,7 +27,9 @@ struct JudgedDimension {
   double deviation_mm = 0.0;  // measured - nominal; NaN when not determined
   double lower_mm = 0.0;      // limits of the size
   double upper_mm = 0.0;
-  double uncertainty_mm = 0.0;    // expanded, k = 2; NaN when not determined
+  std::string definition;                          // what was measured; empty when not determined
+  double uncertainty_mm = 0.0;                     // expanded, k = 2; NaN when not determined
+  std::vector<UncertaintyTerm> uncertainty_terms;  // its contributions; empty where U was stated
   double temperature_degc = 0.0;  // for which the size and its limits hold; NaN when not known
   int points = 0;                 // used
   double rejected_share = 0.0;    // of the points of the feature, 0..1

@@ -6,6 +6,7 @@
 #include <numbers>
 #include <optional>
 
+#include "services/common/features/cone_fit.h"
 #include "services/common/features/cylinder_fit.h"
 #include "services/common/features/plane_fit.h"
 #include "services/common/features/sphere_fit.h"
@@ -20,6 +21,9 @@ namespace {
 
 using Points = std::vector<Eigen::Vector3d>;
 using Json = nlohmann::json;
+
+constexpr double kDegreesPerRadian = 180 / std::numbers::pi;
+constexpr double kAnyForm = 1e6;  // mm, and a share: nothing scatters more
 
 struct Arguments {
   std::string shape, cloud, json;
@@ -61,33 +65,60 @@ Points TakePoints(const PointCloud& cloud, const Arguments& arguments) {
   return points;
 }
 
-Json Quality(const FitQuality& quality) {
-  return {{"points", quality.used()}, {"rejected", quality.rejected}, {"sigma_mm", quality.sigma_mm}};
+// What all shapes tell: form errors are upper bounds, they contain the noise of the points.
+template <typename Shape>
+Json Quality(const Points& points, const Shape& fit) {
+  return {{"points", fit.quality.used()},
+          {"rejected", fit.quality.rejected},
+          {"sigma_mm", fit.quality.sigma_mm},
+          {"form_range_mm", fit.quality.range_mm},
+          {"form_d95_mm", ThinnestShellMm(points, fit)}};
+}
+
+Result<Json> FitAxial(const Arguments& arguments, const Points& points) {
+  if (arguments.shape == "cylinder") {
+    ASSIGN_OR_RETURN(const CylinderFit fit, FitCylinder(points, std::nullopt, arguments.fit));
+    Json json = Quality(points, fit);
+    json["axis_point_mm"] = Vector(fit.axis_point);
+    json["axis"] = Vector(fit.axis);
+    json["radius_mm"] = fit.radius_mm;
+    json["axis_uncertainty_deg"] = fit.AxisUncertaintyRad() * kDegreesPerRadian;
+    json["arc_deg"] = fit.arc_deg;
+    json["radius_uncertainty_mm"] = fit.RadiusUncertaintyMm();
+    return json;
+  }
+  // A cone is found from the cylinder that comes nearest, however badly it fits.
+  RobustOptions any = arguments.fit;
+  any.max_form_share = any.max_form_sigma_mm = kAnyForm;
+  ASSIGN_OR_RETURN(const CylinderFit near, FitCylinder(points, std::nullopt, any));
+  ASSIGN_OR_RETURN(const ConeFit fit,
+                   FitCone(points, {near.axis_point, near.axis, near.radius_mm, 0}, arguments.fit));
+  Json json = Quality(points, fit);
+  json["axis_point_mm"] = Vector(fit.axis_point);
+  json["axis"] = Vector(fit.axis);
+  json["radius_mm"] = fit.radius_mm;
+  json["radius_uncertainty_mm"] = fit.RadiusUncertaintyMm();
+  json["half_angle_deg"] = fit.half_angle_rad * kDegreesPerRadian;
+  json["half_angle_uncertainty_deg"] = fit.HalfAngleUncertaintyRad() * kDegreesPerRadian;
+  return json;
 }
 
 Result<Json> FitShape(const Arguments& arguments, const Points& points) {
   Json json;
   if (arguments.shape == "plane") {
     ASSIGN_OR_RETURN(const PlaneFit fit, FitPlane(points, arguments.fit));
-    json = Quality(fit.quality);
+    json = Quality(points, fit);
     json["normal"] = Vector(fit.normal);
     json["offset_mm"] = fit.offset_mm();
     json["offset_uncertainty_mm"] = fit.OffsetUncertaintyMm(fit.point);
   } else if (arguments.shape == "sphere") {
     ASSIGN_OR_RETURN(const SphereFit fit, FitSphere(points, arguments.fit));
-    json = Quality(fit.quality);
+    json = Quality(points, fit);
     json["center_mm"] = Vector(fit.center);
     json["radius_mm"] = fit.radius_mm;
     json["radius_uncertainty_mm"] = std::sqrt(fit.covariance(3, 3));
   } else {
-    ASSIGN_OR_RETURN(const CylinderFit fit, FitCylinder(points, std::nullopt, arguments.fit));
-    json = Quality(fit.quality);
-    json["axis_point_mm"] = Vector(fit.axis_point);
-    json["axis"] = Vector(fit.axis);
-    json["radius_mm"] = fit.radius_mm;
-    json["axis_uncertainty_deg"] = fit.AxisUncertaintyRad() * 180 / std::numbers::pi;
-    json["arc_deg"] = fit.arc_deg;
-    json["radius_uncertainty_mm"] = fit.RadiusUncertaintyMm();
+    return FitAxial(arguments, points);
   }
   return json;
 }
@@ -111,10 +142,10 @@ Status Run(const Arguments& arguments) {
 
 void AddFitCommand(CLI::App& app, Status& outcome) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* command = app.add_subcommand("fit", "Fit a plane, sphere or cylinder to a cloud");
-  command->add_option("shape", arguments->shape, "plane, sphere or cylinder")
+  CLI::App* command = app.add_subcommand("fit", "Fit a plane, sphere, cylinder or cone to a cloud");
+  command->add_option("shape", arguments->shape, "plane, sphere, cylinder or cone")
       ->required()
-      ->check(CLI::IsMember({"plane", "sphere", "cylinder"}));
+      ->check(CLI::IsMember({"plane", "sphere", "cylinder", "cone"}));
   command->add_option("--cloud", arguments->cloud, "points, PLY or PCD, mm")->required();
   command->add_option("--near", arguments->near_mm, "x,y,z: only points about this place, mm")
       ->delimiter(',')

@@ -15,87 +15,92 @@ using Matrix5 = Eigen::Matrix<double, 5, 5>;
 using Vector5 = Eigen::Matrix<double, 5, 1>;
 using Points = std::span<const Eigen::Vector3d>;
 
-constexpr int kMaxSteps = 60;
-constexpr double kStopShare = 1e-9;  // of the radius
 constexpr double kWeakShare =
     1e-8;  // smallest eigenvalue against the largest: below, the points do not fix a cylinder
 constexpr int kDirections = 400;  // tried on the half sphere when there is no start: about 7 degrees apart
 constexpr std::size_t kTrialPoints = 500;
-constexpr int kCandidates = 5;  // best directions that are refined
+constexpr int kCandidates = 5;             // best directions that are refined
+constexpr std::size_t kArcPoints = 16384;  // tell the arc; more would not tell it better
 constexpr int kArcBins = 720;
+constexpr double kEverything = std::numeric_limits<double>::infinity();
 constexpr double kFullTurnDeg = 360;
 constexpr double kCoreShare =
     0.1;  // of the mean count of the filled bins: a bin with fewer holds only strays
 constexpr double kLeastArcDeg = 10;  // for a radius: below, noise decides whether it is a cylinder or a plane
 
-struct System {
-  Matrix5 normal = Matrix5::Zero();
-  Vector5 right = Vector5::Zero();
-};
+// A cylinder on its way to the least-squares one.
+class CylinderModel {
+ public:
+  static constexpr int kUnknowns = CylinderSums::kUnknowns;
+  static constexpr const char* kName = "cylinder";
 
-// Length the tilt is scaled with, so that all unknowns are mm of about the same effect.
-double HalfLength(Points points, const CylinderFit& c) {
-  double squares = 0;
-  for (const Eigen::Vector3d& p : points) squares += std::pow((p - c.axis_point).dot(c.axis), 2);
-  return std::max(std::sqrt(squares / static_cast<double>(points.size())), 1e-6);
-}
-
-System Accumulate(Points points, const CylinderFit& c, const Eigen::Matrix<double, 3, 2>& across,
-                  double half_length) {
-  System sum;
-  for (const Eigen::Vector3d& p : points) {
-    const Eigen::Vector3d q = p - c.axis_point;
-    const double along = q.dot(c.axis);
-    const Eigen::Vector3d radial = q - along * c.axis;
-    const double distance = radial.norm();
-    if (!(distance > 0)) continue;
-    const Eigen::Vector2d unit = across.transpose() * radial / distance;
-    Vector5 row;
-    row << unit, along / half_length * unit, c.radius_constrained ? 0.0 : 1.0;
-    sum.normal.noalias() += row * row.transpose();
-    sum.right += row * (distance - c.radius_mm);
+  // Tilts are scaled with the half length of the points, so that all unknowns are mm of about the same
+  // effect.
+  CylinderModel(Points points, const CylinderFit& start) : fit_(start) {
+    Eigen::Vector3d centroid = Eigen::Vector3d::Zero();
+    for (const Eigen::Vector3d& p : points) centroid += p;
+    centroid /= static_cast<double>(points.size());
+    // Beside the centroid position and tilt are least entangled.
+    fit_.axis_point += (centroid - fit_.axis_point).dot(fit_.axis) * fit_.axis;
+    double squares = 0;
+    for (const Eigen::Vector3d& p : points) squares += std::pow((p - fit_.axis_point).dot(fit_.axis), 2);
+    half_length_mm_ = std::max(std::sqrt(squares / static_cast<double>(points.size())), 1e-6);
   }
-  if (c.radius_constrained) sum.normal(4, 4) = static_cast<double>(points.size());
-  return sum;
-}
 
-// Moves the axis point beside the centroid, where position and tilt are least entangled.
-void Recenter(Points points, CylinderFit& c) {
-  Eigen::Vector3d centroid = Eigen::Vector3d::Zero();
-  for (const Eigen::Vector3d& p : points) centroid += p;
-  centroid /= static_cast<double>(points.size());
-  c.axis_point += (centroid - c.axis_point).dot(c.axis) * c.axis;
-}
+  const CylinderFit& fit() const { return fit_; }
+  double SizeMm() const { return fit_.radius_mm; }
+  NormalSums<5> Sum(Points points, double limit_mm) const {
+    NormalSums<5> sums = SumRows(points, Frame(), Shape(), limit_mm);
+    for (int i = 0; i < 5; ++i) {
+      if (!(i < 4 ? fit_.axis_constrained : fit_.radius_constrained)) continue;
+      sums.normal.row(i).setZero();
+      sums.normal.col(i).setZero();
+      sums.normal(i, i) = static_cast<double>(sums.used);
+      sums.right[i] = 0;
+    }
+    return sums;
+  }
+  std::vector<float> Residuals(Points points) const { return AbsoluteResiduals(points, Frame(), Shape()); }
 
-Result<CylinderFit> GaussNewton(Points points, CylinderFit c) {
-  if (points.size() < 5)
-    return Fail(ErrorCode::kDegenerate, "{} points are left, a cylinder needs 5", points.size());
-  Recenter(points, c);
-  const double half_length = HalfLength(points, c);
-  for (int step = 0; step < kMaxSteps; ++step) {
-    Eigen::Matrix<double, 3, 2> across;
-    across.col(0) = c.axis.unitOrthogonal();
-    across.col(1) = c.axis.cross(across.col(0));
-    const System sum = Accumulate(points, c, across, half_length);
-    const Eigen::SelfAdjointEigenSolver<Matrix5> eigen(sum.normal, Eigen::EigenvaluesOnly);
-    if (!(eigen.eigenvalues()[0] > kWeakShare * eigen.eigenvalues()[4])) break;
+  Result<double> Move(const NormalSums<5>& sums) {
+    if (sums.used < 5)
+      return Fail(ErrorCode::kDegenerate, "{} points are left, a cylinder needs 5", sums.used);
+    const Eigen::SelfAdjointEigenSolver<Matrix5> eigen(sums.normal, Eigen::EigenvaluesOnly);
+    if (!(eigen.eigenvalues()[0] > kWeakShare * eigen.eigenvalues()[4])) return NoCylinder(sums.used);
+    const Eigen::Matrix3d axes = Frame().axes;
+    const Matrix5 inverse = sums.normal.inverse();
+    const Vector5 move = inverse * sums.right;
+    fit_.axis_point += axes.leftCols<2>() * move.head<2>();
+    fit_.axis = (fit_.axis + axes.leftCols<2>() * move.segment<2>(2) / half_length_mm_).normalized();
+    fit_.axis_point += sums.along / static_cast<double>(sums.used) * fit_.axis;
+    fit_.radius_mm += move[4];
+    if (!(fit_.radius_mm > 0) || !move.allFinite()) return NoCylinder(sums.used);
     Vector5 scale;
-    scale << 1, 1, 1 / half_length, 1 / half_length, 1;
-    const Matrix5 inverse = sum.normal.inverse();
-    const Vector5 move = inverse * sum.right;
-    c.axis_point += across * move.head<2>();
-    c.axis = (c.axis + across * move.segment<2>(2) / half_length).normalized();
-    c.radius_mm += move[4];
-    c.covariance = scale.asDiagonal() * inverse * scale.asDiagonal();
-    if (c.radius_constrained) c.covariance(4, 4) = 0;
-    if (!(c.radius_mm > 0) || !move.allFinite()) break;
-    if (move.norm() < kStopShare * c.radius_mm) return c;
+    scale << 1, 1, 1 / half_length_mm_, 1 / half_length_mm_, 1;
+    fit_.covariance = scale.asDiagonal() * inverse * scale.asDiagonal();
+    if (fit_.axis_constrained) fit_.covariance.topLeftCorner<4, 4>().setZero();
+    if (fit_.radius_constrained) fit_.covariance(4, 4) = 0;
+    return sums.right.dot(move);
   }
-  return Fail(ErrorCode::kNotConverged,
-              "no cylinder through the {} points: they do not fix axis and radius, or are of "
-              "another shape",
-              points.size());
-}
+
+ private:
+  static Error NoCylinder(std::size_t used) {
+    return Fail(ErrorCode::kNotConverged,
+                "no cylinder through the {} points: they do not fix axis and radius, or are of "
+                "another shape",
+                used);
+  }
+  FitFrame Frame() const {
+    FitFrame frame{fit_.axis_point, {}};
+    const Eigen::Vector3d u = fit_.axis.unitOrthogonal();
+    frame.axes << u, fit_.axis.cross(u), fit_.axis;
+    return frame;
+  }
+  CylinderSums Shape() const { return {fit_.radius_mm, 1 / half_length_mm_}; }
+
+  CylinderFit fit_;
+  double half_length_mm_ = 1;
+};
 
 // Algebraic circle of the points seen along `axis`; radius 0 if they have none.
 CylinderFit CircleAlong(Points points, const Eigen::Vector3d& axis) {
@@ -121,17 +126,8 @@ CylinderFit CircleAlong(Points points, const Eigen::Vector3d& axis) {
   return c;
 }
 
-double MedianResidual(Points points, const CylinderFit& c) {
-  std::vector<double> residuals;
-  for (const Eigen::Vector3d& p : points) residuals.push_back(std::abs(c.Residual(p)));
-  return RejectionLimit(residuals, 1);
-}
-
-std::vector<Eigen::Vector3d> EvenSample(Points points) {
-  const std::size_t step = std::max<std::size_t>(1, points.size() / kTrialPoints);
-  std::vector<Eigen::Vector3d> sample;
-  for (std::size_t i = 0; i < points.size(); i += step) sample.push_back(points[i]);
-  return sample;
+double MedianResidual(Points points, const CylinderModel& model) {
+  return RejectionLimit(model.Residuals(points), 1);
 }
 
 // Directions on a spiral over the half sphere.
@@ -143,33 +139,34 @@ Eigen::Vector3d TrialDirection(int i) {
 }
 
 Result<CylinderFit> SearchStart(Points points) {
-  const std::vector<Eigen::Vector3d> sample = EvenSample(points);
+  const std::vector<Eigen::Vector3d> sample = EvenSample(points, kTrialPoints);
   std::vector<std::pair<double, int>> ranking;
   for (int i = 0; i < kDirections; ++i) {
     const CylinderFit c = CircleAlong(sample, TrialDirection(i));
-    if (c.radius_mm > 0) ranking.emplace_back(MedianResidual(sample, c), i);
+    if (c.radius_mm > 0) ranking.emplace_back(MedianResidual(sample, {sample, c}), i);
   }
   std::sort(ranking.begin(), ranking.end());
   std::optional<CylinderFit> best;
   double best_residual = 0;
   for (std::size_t i = 0; i < std::min<std::size_t>(kCandidates, ranking.size()); ++i) {
-    const auto refined = GaussNewton(sample, CircleAlong(sample, TrialDirection(ranking[i].second)));
-    if (!refined.ok()) continue;
-    const double residual = MedianResidual(sample, *refined);
+    CylinderModel refined(sample, CircleAlong(sample, TrialDirection(ranking[i].second)));
+    if (!Settle(std::span(sample), kEverything, kEnough, refined).ok()) continue;
+    const double residual = MedianResidual(sample, refined);
     if (best && residual >= best_residual) continue;
-    best = *refined;
+    best = refined.fit();
     best_residual = residual;
   }
   if (best) return *best;
+  RETURN_IF_ERROR(CheckFinite(points));
   return Fail(ErrorCode::kDegenerate, "no cylinder through the {} points from any direction", points.size());
 }
 
 // Points used in each of kArcBins directions about the axis.
-std::array<std::size_t, kArcBins> CountDirections(Points points, const CylinderFit& c, double limit_mm) {
+std::array<std::size_t, kArcBins> CountDirections(Points points, const CylinderFit& c) {
   std::array<std::size_t, kArcBins> counts{};
   const Eigen::Vector3d u = c.axis.unitOrthogonal(), v = c.axis.cross(u);
   for (const Eigen::Vector3d& p : points) {
-    if (std::abs(c.Residual(p)) > limit_mm) continue;
+    if (std::abs(c.Residual(p)) > c.quality.limit_mm) continue;
     const double turn =
         std::atan2(v.dot(p - c.axis_point), u.dot(p - c.axis_point)) / (2 * std::numbers::pi) + 0.5;
     ++counts[static_cast<std::size_t>(turn * kArcBins) % kArcBins];
@@ -177,10 +174,8 @@ std::array<std::size_t, kArcBins> CountDirections(Points points, const CylinderF
   return counts;
 }
 
-double ArcDeg(Points points, const CylinderFit& c, double reject_sigmas) {
-  std::vector<double> residuals;
-  for (const Eigen::Vector3d& p : points) residuals.push_back(std::abs(c.Residual(p)));
-  const auto counts = CountDirections(points, c, RejectionLimit(residuals, reject_sigmas));
+double ArcDeg(Points points, const CylinderFit& c) {
+  const auto counts = CountDirections(EvenSample(points, kArcPoints), c);
   std::size_t filled = 0, used = 0;
   for (const std::size_t count : counts) {
     filled += count > 0 ? 1U : 0U;
@@ -199,7 +194,7 @@ double ArcDeg(Points points, const CylinderFit& c, double reject_sigmas) {
 
 // Whether what is seen of the cylinder fixes its radius.
 Status CheckArc(const CylinderFit& c) {
-  if (c.radius_constrained) return {};
+  if (c.radius_constrained || c.axis_constrained) return {};
   if (c.arc_deg < kLeastArcDeg) {
     return Fail(ErrorCode::kDegenerate,
                 "the points cover an arc of {:.1f} degrees, a radius needs at least {}", c.arc_deg,
@@ -220,6 +215,7 @@ Result<CylinderFit> FromStart(Points points, const std::optional<CylinderStart>&
   c.axis = start->axis / length;
   c.radius_mm = start->radius_mm;
   c.radius_constrained = start->keep_radius;
+  c.axis_constrained = start->keep_axis;
   return c;
 }
 
@@ -238,15 +234,15 @@ Status CheckAxis(const CylinderFit& cylinder) {
 
 Result<CylinderFit> FitCylinder(std::span<const Eigen::Vector3d> points,
                                 const std::optional<CylinderStart>& start, const RobustOptions& options) {
-  constexpr std::size_t kUnknowns = 5;
-  RETURN_IF_ERROR(CheckPoints(points, std::max(kUnknowns, options.min_points), "cylinder"));
+  constexpr std::size_t kUnknowns = CylinderSums::kUnknowns;
+  RETURN_IF_ERROR(CheckCount(points, std::max(kUnknowns, options.min_points), "cylinder"));
   ASSIGN_OR_RETURN(const CylinderFit first, FromStart(points, start));
-  const auto fit = [&](const std::vector<Eigen::Vector3d>& used, const CylinderFit* before) {
-    return GaussNewton(used, before != nullptr ? *before : first);
-  };
-  ASSIGN_OR_RETURN(CylinderFit cylinder, FitRobust<CylinderFit>(points, options, fit));
+  CylinderModel model(EvenSample(points, kStartPoints), first);
+  ASSIGN_OR_RETURN(const FitQuality quality, FitRobust(points, options, model));
+  CylinderFit cylinder = model.fit();
+  cylinder.quality = quality;
   RETURN_IF_ERROR(CheckForm(cylinder.quality, cylinder.radius_mm, options, "cylinder"));
-  cylinder.arc_deg = ArcDeg(points, cylinder, options.reject_sigmas);
+  cylinder.arc_deg = ArcDeg(points, cylinder);
   RETURN_IF_ERROR(CheckArc(cylinder));
   Eigen::Index largest = 0;
   cylinder.axis.cwiseAbs().maxCoeff(&largest);

@@ -19,8 +19,9 @@ struct CylinderFit {
   double arc_deg = 0;  // 360 less the largest gap in the points used, seen along the axis; strays
                        // do not fill a gap
   bool radius_constrained = false;  // the radius was given, not fitted
+  bool axis_constrained = false;    // the axis was given, not fitted
   // Of (axis_point along two directions across the axis, tilt towards them in rad, radius), as if the points
-  // were independent. A constrained radius has variance 0.
+  // were independent. What is constrained has variance 0.
   Eigen::Matrix<double, 5, 5> covariance = Eigen::Matrix<double, 5, 5>::Zero();
   FitQuality quality;
 
@@ -38,6 +39,7 @@ struct CylinderStart {
   Eigen::Vector3d axis;
   double radius_mm;
   bool keep_radius = false;  // fit position and direction only
+  bool keep_axis = false;    // fit the radius only
 };
 
 // Gauss-Newton over the five parameters. Without a start, directions all over the half sphere are tried on a

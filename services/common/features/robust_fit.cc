@@ -1,6 +1,8 @@
 #include "services/common/features/robust_fit.h"
 
 #include <algorithm>
+#include <bit>
+#include <cstdint>
 #include <numbers>
 #include <utility>
 
@@ -16,6 +18,28 @@ constexpr double kRoundingMm = 1e-6;    // keeps exact data from losing points t
 // clear of the edge.
 constexpr double kLeastSagittaSigmas = 10;
 constexpr double kDegreesPerRadian = 180 / std::numbers::pi;
+constexpr double kGoldenShare = 0.6180339887498949;  // its multiples fall evenly into [0, 1)
+constexpr double kShellShare = 0.95;
+
+// The value with half of the others below it, by halving an interval of bit patterns: those of numbers >= 0
+// stand in the numbers' own order, and NaN behind them.
+double Middle(std::span<const float> values) {
+  constexpr std::int32_t kNoSign = 0x7fffffff, kInfinity = 0x7f800000;
+  std::int32_t low = 0, high = kInfinity;
+  while (low < high) {
+    const std::int32_t middle = low + (high - low) / 2;
+    std::int32_t below = 0;
+    for (const float value : values) {
+      below += (std::bit_cast<std::int32_t>(value) & kNoSign) <= middle ? 1 : 0;
+    }
+    if (static_cast<std::size_t>(below) > values.size() / 2) {
+      high = middle;
+    } else {
+      low = middle + 1;
+    }
+  }
+  return static_cast<double>(std::bit_cast<float>(low));
+}
 
 }  // namespace
 
@@ -34,22 +58,60 @@ Status Check(const RobustOptions& options) {
               options.max_rejected_share, options.max_rounds);
 }
 
-double RejectionLimit(std::vector<double>& absolute_residuals, double reject_sigmas) {
+double RejectionLimit(std::span<const float> absolute_residuals, double reject_sigmas) {
   if (absolute_residuals.empty()) return kRoundingMm;
-  const auto middle = absolute_residuals.begin() + static_cast<std::ptrdiff_t>(absolute_residuals.size() / 2);
-  std::nth_element(absolute_residuals.begin(), middle, absolute_residuals.end());
-  return reject_sigmas * kMadToSigma * *middle + kRoundingMm;
+  return reject_sigmas * kMadToSigma * Middle(absolute_residuals) + kRoundingMm;
 }
 
-Status CheckPoints(std::span<const Eigen::Vector3d> points, std::size_t needed, const char* feature) {
-  if (points.size() < needed) {
-    return Fail(ErrorCode::kInvalidArgument, "{} points, a {} needs at least {}", points.size(), feature,
-                needed);
+std::vector<Eigen::Vector3d> EvenSample(std::span<const Eigen::Vector3d> points, std::size_t count) {
+  if (points.size() <= count) return {points.begin(), points.end()};
+  std::vector<Eigen::Vector3d> sample;
+  sample.reserve(count);
+  const double stretch = static_cast<double>(points.size()) / static_cast<double>(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const double golden = static_cast<double>(i) * kGoldenShare, at = golden - std::floor(golden);
+    sample.push_back(points[static_cast<std::size_t>((static_cast<double>(i) + at) * stretch)]);
   }
+  return sample;
+}
+
+double ThinnestShellMm(std::vector<double> residuals) {
+  std::sort(residuals.begin(), residuals.end());
+  const auto held = static_cast<std::size_t>(std::ceil(kShellShare * static_cast<double>(residuals.size())));
+  double thinnest_mm = residuals.back() - residuals.front();
+  for (std::size_t i = 0; i + held <= residuals.size(); ++i) {
+    thinnest_mm = std::min(thinnest_mm, residuals[i + held - 1] - residuals[i]);
+  }
+  return thinnest_mm;
+}
+
+Status CheckCount(std::span<const Eigen::Vector3d> points, std::size_t needed, const char* feature) {
+  if (points.size() >= needed) return {};
+  RETURN_IF_ERROR(CheckFinite(points));
+  return Fail(ErrorCode::kInvalidArgument, "{} points, a {} needs at least {}", points.size(), feature,
+              needed);
+}
+
+Status CheckFinite(std::span<const Eigen::Vector3d> points) {
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (!points[i].allFinite()) return Fail(ErrorCode::kInvalidArgument, "point {} is not finite", i);
   }
   return {};
+}
+
+Result<FitQuality> Describe(std::size_t points, std::size_t used, double sigma_mm,
+                            const RobustOptions& options) {
+  const std::size_t rejected = points - used;
+  if (static_cast<double>(rejected) > options.max_rejected_share * static_cast<double>(points)) {
+    return Fail(ErrorCode::kUntrusted,
+                "{} of {} points were rejected, at most {:.0f} % may be: they are of another shape", rejected,
+                points, 100 * options.max_rejected_share);
+  }
+  FitQuality quality;
+  quality.points = points;
+  quality.rejected = rejected;
+  quality.sigma_mm = sigma_mm;
+  return quality;
 }
 
 Status CheckForm(const FitQuality& quality, double size_mm, const RobustOptions& options,

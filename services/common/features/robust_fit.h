@@ -2,10 +2,13 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <span>
 #include <vector>
 
+#include "services/common/features/fit_sums.h"
 #include "services/common/result.h"
 
 namespace forgescan {
@@ -27,6 +30,8 @@ struct FitQuality {
   std::size_t points = 0;
   std::size_t rejected = 0;
   double sigma_mm = 0;  // standard deviation of the residuals of the points used
+  double limit_mm = 0;  // points with a larger residual were rejected
+  double range_mm = 0;  // form error: highest less lowest residual of the points used
 
   std::size_t used() const { return points - rejected; }
   double rejected_share() const {
@@ -34,11 +39,31 @@ struct FitQuality {
   }
 };
 
-// k * 1.4826 * median |residual|, at least the rounding of single-precision points. Moves the values about.
-double RejectionLimit(std::vector<double>& absolute_residuals, double reject_sigmas);
+// k * 1.4826 * median |residual|, at least the rounding of single-precision points. A NaN counts as farthest.
+double RejectionLimit(std::span<const float> absolute_residuals, double reject_sigmas);
 
-// Errors: kInvalidArgument for a point that is not finite, or fewer points than `needed`.
-Status CheckPoints(std::span<const Eigen::Vector3d> points, std::size_t needed, const char* feature);
+// One point in each of `count` equal stretches of their order, at an uneven place in it, so that the sample
+// does not fall into step with the rows of a scan. All points if there are not more than that.
+std::vector<Eigen::Vector3d> EvenSample(std::span<const Eigen::Vector3d> points, std::size_t count);
+
+// Thickness of the thinnest shell along the feature that holds 95 % of the points used (ISO 10360-13 names
+// it D95%). Shape: signed residuals of the points used, at least 1. Units: mm.
+double ThinnestShellMm(std::vector<double> residuals);
+
+// The same of a fitted shape's points; 0 if it used none. Shape: Residual(point) and quality.
+template <typename Shape>
+double ThinnestShellMm(std::span<const Eigen::Vector3d> points, const Shape& shape) {
+  std::vector<double> residuals;
+  for (const Eigen::Vector3d& p : points) {
+    const double residual = shape.Residual(p);
+    if (std::abs(residual) <= shape.quality.limit_mm) residuals.push_back(residual);
+  }
+  return residuals.empty() ? 0 : ThinnestShellMm(std::move(residuals));
+}
+
+// Errors: kInvalidArgument for fewer points than `needed`, or (naming the first) one that is not finite.
+Status CheckCount(std::span<const Eigen::Vector3d> points, std::size_t needed, const char* feature);
+Status CheckFinite(std::span<const Eigen::Vector3d> points);
 
 // Errors: kUntrusted if fewer than min_points are used, or if their residuals are no longer small against
 // size_mm (the radius, or the smaller spread of a plane's points) and max_form_sigma_mm: the points are of
@@ -52,42 +77,91 @@ Status CheckForm(const FitQuality& quality, double size_mm, const RobustOptions&
 // the angle seen from the centre.
 Status CheckSagitta(const FitQuality& quality, double radius_mm, double half_arc_rad, const char* feature);
 
-// Purpose: drop what lies beyond k sigma and refit, until none is left or max_rounds: every round judges all
-// points anew, so that a point dropped early can come back. Fit: (points used, shape before or nullptr) ->
-// Result<Shape>; Shape: double Residual(point) const and FitQuality quality; kUnknowns. Errors: those of the
-// fit; kUntrusted if too many points were rejected.
-template <typename Shape, typename Fit>
-Result<Shape> FitRobust(std::span<const Eigen::Vector3d> points, const RobustOptions& options,
-                        const Fit& fit) {
-  RETURN_IF_ERROR(Check(options));
-  std::vector<Eigen::Vector3d> used(points.begin(), points.end());
-  ASSIGN_OR_RETURN(Shape shape, fit(used, static_cast<const Shape*>(nullptr)));
-  std::vector<double> residuals(points.size()), sorted;
+// Errors: kUntrusted if too many points were rejected.
+Result<FitQuality> Describe(std::size_t points, std::size_t used, double sigma_mm,
+                            const RobustOptions& options);
+
+inline constexpr std::size_t kStartPoints = 4096;  // the start is found with as many of the points
+inline constexpr int kMaxFitSteps = 60;
+inline constexpr double kSettledShare = 1e-9;  // of the size: a step below is rounding
+// Steps end when they move the shape by less than this share of its own standard uncertainty: the start need
+// not be exact, and the end is as exact as anything said of it.
+inline constexpr double kStartEnough = 0.1;
+inline constexpr double kEnough = 0.01;
+inline constexpr double kSameLimitShare = 1e-3;
+
+template <typename Model>
+double Variance(const NormalSums<Model::kUnknowns>& sums) {
+  return sums.squares / std::max(1.0, static_cast<double>(sums.used) - Model::kUnknowns);
+}
+
+// One pass and one Gauss-Newton step; whether it was so small that no more are needed. Errors: Move()'s.
+template <typename Model>
+Result<bool> StepOnce(std::span<const Eigen::Vector3d> points, double limit_mm, double enough, Model& model,
+                      NormalSums<Model::kUnknowns>& sums) {
+  sums = model.Sum(points, limit_mm);
+  ASSIGN_OR_RETURN(const double gain_mm2, model.Move(sums));
+  sums.squares = std::max(0.0, sums.squares - gain_mm2);
+  const double moved_mm = std::sqrt(std::max(0.0, gain_mm2) / static_cast<double>(sums.used));
+  return moved_mm <= kSettledShare * model.SizeMm() || gain_mm2 <= enough * enough * Variance<Model>(sums);
+}
+
+// Errors: Move()'s; kNotConverged.
+template <typename Model>
+Result<NormalSums<Model::kUnknowns>> Settle(std::span<const Eigen::Vector3d> points, double limit_mm,
+                                            double enough, Model& model) {
+  NormalSums<Model::kUnknowns> sums;
+  for (int step = 0; step < kMaxFitSteps; ++step) {
+    ASSIGN_OR_RETURN(const bool settled, StepOnce(points, limit_mm, enough, model, sums));
+    if (settled) return sums;
+  }
+  return Fail(ErrorCode::kNotConverged, "the {} through {} points did not settle in {} steps", Model::kName,
+              points.size(), kMaxFitSteps);
+}
+
+// The limit beyond which a point is no part of the shape, found with the points given, and the shape with it:
+// every round judges all of them anew, so that a point dropped early can come back.
+template <typename Model>
+Result<double> FindLimit(std::span<const Eigen::Vector3d> points, const RobustOptions& options,
+                         Model& model) {
+  constexpr double kEverything = std::numeric_limits<double>::infinity();
+  if (const auto start = Settle(points, kEverything, kStartEnough, model); !start.ok()) return start.error();
+  double limit_mm = kEverything;
   for (int round = 0; round < options.max_rounds; ++round) {
-    for (std::size_t i = 0; i < points.size(); ++i) residuals[i] = std::abs(shape.Residual(points[i]));
-    sorted = residuals;
-    const double limit = RejectionLimit(sorted, options.reject_sigmas);
-    std::vector<Eigen::Vector3d> next;
-    next.reserve(points.size());
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      if (residuals[i] <= limit) next.push_back(points[i]);
-    }
-    const bool unchanged = next.size() == used.size() && round > 0;
-    used.swap(next);
-    if (unchanged) break;
-    ASSIGN_OR_RETURN(shape, fit(used, &shape));
+    const double next_mm = RejectionLimit(model.Residuals(points), options.reject_sigmas);
+    const bool same = std::abs(next_mm - limit_mm) <= kSameLimitShare * limit_mm;
+    limit_mm = next_mm;
+    NormalSums<Model::kUnknowns> sums;
+    ASSIGN_OR_RETURN(const bool settled, StepOnce(points, limit_mm, kStartEnough, model, sums));
+    if (same && settled) break;
   }
-  double squares = 0;
-  for (const Eigen::Vector3d& p : used) squares += shape.Residual(p) * shape.Residual(p);
-  const double freedom = std::max(1.0, static_cast<double>(used.size()) - Shape::kUnknowns);
-  if (static_cast<double>(points.size() - used.size()) >
-      options.max_rejected_share * static_cast<double>(points.size())) {
-    return Fail(ErrorCode::kUntrusted,
-                "{} of {} points were rejected, at most {:.0f} % may be: they are of another shape",
-                points.size() - used.size(), points.size(), 100 * options.max_rejected_share);
+  return limit_mm;
+}
+
+// Purpose: least squares without what lies beyond k sigma. Shape and limit are found with a sample of the
+// points, then the shape is refined with all of them, which takes two or three passes. Model, a shape that
+// has a start: kUnknowns; kName; SizeMm(); Sum(points, limit) and Residuals(points) as SumRows() and
+// AbsoluteResiduals(); Move(sums) -> Result<double>, one Gauss-Newton step, how much it takes from the sum of
+// squares (mm^2). Returns the sums of the last pass, their squares those after its step. Errors: Move()'s;
+// kInvalidArgument for a point that is not finite; kUntrusted if too many points were rejected.
+template <typename Model>
+Result<FitQuality> FitRobust(std::span<const Eigen::Vector3d> points, const RobustOptions& options,
+                             Model& model) {
+  RETURN_IF_ERROR(Check(options));
+  const std::vector<Eigen::Vector3d> sample = EvenSample(points, kStartPoints);
+  const auto limit_mm = FindLimit(std::span(sample), options, model);
+  if (!limit_mm.ok()) {
+    RETURN_IF_ERROR(CheckFinite(points));
+    return limit_mm.error();
   }
-  shape.quality = {points.size(), points.size() - used.size(), std::sqrt(squares / freedom)};
-  return shape;
+  const auto sums = Settle(points, *limit_mm, kEnough, model);
+  if (!sums.ok() || sums->finite < points.size()) RETURN_IF_ERROR(CheckFinite(points));
+  if (!sums.ok()) return sums.error();
+  ASSIGN_OR_RETURN(FitQuality quality,
+                   Describe(points.size(), sums->used, std::sqrt(Variance<Model>(*sums)), options));
+  quality.limit_mm = *limit_mm;
+  quality.range_mm = sums->highest - sums->lowest;
+  return quality;
 }
 
 }  // namespace forgescan

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <optional>
 
 #include "services/common/parallel_blocks.h"
 
@@ -35,86 +34,69 @@ Result<std::optional<TriangleIndex>> BorderOf(const ModelBundle& model, const Mo
   return std::optional<TriangleIndex>(std::move(index));
 }
 
-class Selector {
- public:
-  static Result<Selector> Build(const ModelBundle& model, const std::vector<std::uint32_t>& faces) {
-    RETURN_IF_ERROR(Check(model));
-    ASSIGN_OR_RETURN(TriangleIndex surface, TriangleIndex::Build(model.vertices, model.triangles));
-    Selector selector(std::move(surface));
-    std::vector<std::uint32_t> slot_of_face(model.faces.size(), kNotAsked);
-    for (const std::uint32_t face : faces) {
-      if (face >= model.faces.size()) {
-        return Fail(ErrorCode::kInvalidArgument, "face {} of a model with {}", face, model.faces.size());
-      }
-      slot_of_face[face] = static_cast<std::uint32_t>(selector.borders_.size());
-      ASSIGN_OR_RETURN(auto border, BorderOf(model, model.faces[face]));
-      selector.borders_.push_back(std::move(border));
-    }
-    selector.slot_of_triangle_ = FaceOfTriangles(model);
-    for (std::uint32_t& entry : selector.slot_of_triangle_) entry = slot_of_face[entry];
-    return selector;
+Status CheckShape(const PointCloud& cloud) {
+  if (!cloud.normals.empty() && cloud.normals.size() != cloud.size()) {
+    return Fail(ErrorCode::kInvalidArgument, "the cloud has {} points but {} normals", cloud.size(),
+                cloud.normals.size());
   }
-
-  // Slot of the face that owns the point, or kNotAsked.
-  std::uint32_t SlotOf(const PointCloud& cloud, std::size_t i, const SelectOptions& options,
-                       std::uint32_t& hint) const {
-    const auto hit = surface_.Find(cloud.points[i], static_cast<float>(options.max_distance_mm), hint);
-    if (!hit) return kNotAsked;
-    hint = hit->triangle;
-    const std::uint32_t slot = slot_of_triangle_[hit->triangle];
-    if (slot == kNotAsked) return kNotAsked;
-    if (!cloud.normals.empty()) {
-      const Eigen::Vector3f& measured = cloud.normals[i];
-      const auto min_cosine = static_cast<float>(std::cos(options.normal_limit_rad));
-      if (!(measured.dot(surface_.Normal(hit->triangle)) >= min_cosine * measured.norm())) return kNotAsked;
-    }
-    const auto& border = borders_[slot];
-    return border && border->Find(hit->foot, static_cast<float>(options.border_mm)) ? kNotAsked : slot;
-  }
-
- private:
-  explicit Selector(TriangleIndex surface) : surface_(std::move(surface)) {}
-
-  TriangleIndex surface_;
-  std::vector<std::optional<TriangleIndex>> borders_;  // one per asked face
-  std::vector<std::uint32_t> slot_of_triangle_;
-};
+  if (cloud.view.empty() || cloud.view.size() == cloud.size()) return {};
+  return Fail(ErrorCode::kInvalidArgument, "the cloud has {} points but {} view numbers", cloud.size(),
+              cloud.view.size());
+}
 
 }  // namespace
 
-Result<FacePoints> SelectFacePoints(const PointCloud& cloud_in_model, const ModelBundle& model,
-                                    const std::vector<std::uint32_t>& faces, const SelectOptions& options) {
-  if (!cloud_in_model.normals.empty() && cloud_in_model.normals.size() != cloud_in_model.size()) {
-    return Fail(ErrorCode::kInvalidArgument, "the cloud has {} points but {} normals", cloud_in_model.size(),
-                cloud_in_model.normals.size());
+Result<FaceSelector> FaceSelector::Build(const ModelBundle& model, const std::vector<std::uint32_t>& faces) {
+  RETURN_IF_ERROR(Check(model));
+  ASSIGN_OR_RETURN(TriangleIndex surface, TriangleIndex::Build(model.vertices, model.triangles));
+  FaceSelector selector(std::move(surface), faces);
+  std::vector<std::uint32_t> slot_of_face(model.faces.size(), kNotAsked);
+  for (const std::uint32_t face : faces) {
+    if (face >= model.faces.size()) {
+      return Fail(ErrorCode::kInvalidArgument, "face {} of a model with {}", face, model.faces.size());
+    }
+    slot_of_face[face] = static_cast<std::uint32_t>(selector.borders_.size());
+    ASSIGN_OR_RETURN(auto border, BorderOf(model, model.faces[face]));
+    selector.borders_.push_back(std::move(border));
   }
-  ASSIGN_OR_RETURN(const Selector selector, Selector::Build(model, faces));
+  selector.slot_of_triangle_ = FaceOfTriangles(model);
+  for (std::uint32_t& entry : selector.slot_of_triangle_) entry = slot_of_face[entry];
+  return selector;
+}
+
+// Slot of the face that owns the point, or kNotAsked.
+std::uint32_t FaceSelector::SlotOf(const PointCloud& cloud, std::size_t i, const SelectOptions& options,
+                                   std::uint32_t& hint) const {
+  const auto hit = surface_.Find(cloud.points[i], static_cast<float>(options.max_distance_mm), hint);
+  if (!hit) return kNotAsked;
+  hint = hit->triangle;
+  const std::uint32_t slot = slot_of_triangle_[hit->triangle];
+  if (slot == kNotAsked) return kNotAsked;
+  if (!cloud.normals.empty()) {
+    const Eigen::Vector3f& measured = cloud.normals[i];
+    const auto min_cosine = static_cast<float>(std::cos(options.normal_limit_rad));
+    if (!(measured.dot(surface_.Normal(hit->triangle)) >= min_cosine * measured.norm())) return kNotAsked;
+  }
+  const auto& border = borders_[slot];
+  return border && border->Find(hit->foot, static_cast<float>(options.border_mm)) ? kNotAsked : slot;
+}
+
+Result<FacePoints> FaceSelector::Select(const PointCloud& cloud_in_model,
+                                        const SelectOptions& options) const {
+  RETURN_IF_ERROR(CheckShape(cloud_in_model));
   std::vector<std::uint32_t> slots(cloud_in_model.size(), kNotAsked);
   ForEachBlock(slots.size(), kBlock, options.threads, [&](std::size_t, std::size_t begin, std::size_t end) {
     std::uint32_t hint = TriangleIndex::kNoTriangle;
-    for (std::size_t i = begin; i < end; ++i) slots[i] = selector.SlotOf(cloud_in_model, i, options, hint);
+    for (std::size_t i = begin; i < end; ++i) slots[i] = SlotOf(cloud_in_model, i, options, hint);
   });
-  FacePoints result{faces, std::vector<std::vector<Eigen::Vector3d>>(faces.size())};
+  FacePoints result{faces_, std::vector<std::vector<Eigen::Vector3d>>(faces_.size()), {}};
+  if (!cloud_in_model.view.empty()) result.views.resize(faces_.size());
   for (std::size_t i = 0; i < slots.size(); ++i) {
-    if (slots[i] != kNotAsked) result.points[slots[i]].push_back(cloud_in_model.points[i].cast<double>());
+    if (slots[i] == kNotAsked) continue;
+    result.points[slots[i]].push_back(cloud_in_model.points[i].cast<double>());
+    if (!result.views.empty()) result.views[slots[i]].push_back(cloud_in_model.view[i]);
   }
   return result;
-}
-
-std::vector<float> SignedDeviations(const PointCloud& cloud_in_model, const TriangleIndex& surface,
-                                    double max_distance_mm, unsigned threads) {
-  std::vector<float> deviations(cloud_in_model.size(), std::numeric_limits<float>::quiet_NaN());
-  ForEachBlock(deviations.size(), kBlock, threads, [&](std::size_t, std::size_t begin, std::size_t end) {
-    std::uint32_t hint = TriangleIndex::kNoTriangle;
-    for (std::size_t i = begin; i < end; ++i) {
-      const Eigen::Vector3f& p = cloud_in_model.points[i];
-      const auto hit = surface.Find(p, static_cast<float>(max_distance_mm), hint);
-      if (!hit) continue;
-      hint = hit->triangle;
-      deviations[i] = std::copysign(hit->distance_mm, surface.Normal(hit->triangle).dot(p - hit->foot));
-    }
-  });
-  return deviations;
 }
 
 }  // namespace forgescan

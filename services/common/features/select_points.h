@@ -2,7 +2,8 @@
 #pragma once
 
 #include <cstdint>
-#include <string>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include "services/common/geometry/point_cloud.h"
@@ -20,20 +21,33 @@ struct SelectOptions {
   unsigned threads = 0;  // 0: as many as the host has; the result does not depend on it
 };
 
-// Points of the asked faces. Shape: points[i] belongs to faces[i]. Frames: model.
+// Points of the asked faces. Shape: points[i] belongs to faces[i]; views has as many entries, or none for a
+// cloud without. Frames: model.
 struct FacePoints {
   std::vector<std::uint32_t> faces;
   std::vector<std::vector<Eigen::Vector3d>> points;
+  std::vector<std::vector<std::uint16_t>> views;
 };
 
-// Errors: kInvalidArgument for a model that does not pass Check(), normals of another number than points.
-Result<FacePoints> SelectFacePoints(const PointCloud& cloud_in_model, const ModelBundle& model,
-                                    const std::vector<std::uint32_t>& faces, const SelectOptions& options);
+// Made once for a model and the faces that are asked for.
+class FaceSelector {
+ public:
+  // Errors: kInvalidArgument for a model that does not pass Check(), or a face it does not have.
+  static Result<FaceSelector> Build(const ModelBundle& model, const std::vector<std::uint32_t>& faces);
 
-// Signed distance of every point to the nearest model triangle, + outside; NaN where there is none within
-// max_distance_mm. Units: mm. Frames: model. At a sharp edge the triangle that faces the point most decides
-// the sign.
-std::vector<float> SignedDeviations(const PointCloud& cloud_in_model, const TriangleIndex& surface,
-                                    double max_distance_mm, unsigned threads);
+  // Errors: kInvalidArgument for normals or views of another number than points.
+  Result<FacePoints> Select(const PointCloud& cloud_in_model, const SelectOptions& options) const;
+
+ private:
+  FaceSelector(TriangleIndex surface, std::vector<std::uint32_t> faces)
+      : surface_(std::move(surface)), faces_(std::move(faces)) {}
+  std::uint32_t SlotOf(const PointCloud& cloud, std::size_t i, const SelectOptions& options,
+                       std::uint32_t& hint) const;
+
+  TriangleIndex surface_;
+  std::vector<std::uint32_t> faces_;
+  std::vector<std::optional<TriangleIndex>> borders_;  // one per asked face
+  std::vector<std::uint32_t> slot_of_triangle_;
+};
 
 }  // namespace forgescan

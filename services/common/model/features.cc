@@ -15,6 +15,7 @@ namespace forgescan {
 namespace {
 
 constexpr std::array kTypeNames = {"length", "width", "diameter"};
+constexpr std::array kDefinitionNames = {"GG", "LP max", "LP min", "LP mean"};
 constexpr double kParallelCosine = -0.99996;  // nominal planes face away from each other to 0.5 degrees
 constexpr double kSameCylinderMm =
     1e-3;  // radius, and axis offset, between the nominal cylinders of one diameter
@@ -65,6 +66,31 @@ Result<DimensionType> TakeType(const toml::table& table, const Place& place) {
   return Fail(ErrorCode::kFormat, "{}: type '{}', allowed are length, width, diameter", place.text, text);
 }
 
+Status TakeDefinition(const toml::table& table, const Place& place, DimensionSpec& spec) {
+  if (table.contains("definition")) {
+    ASSIGN_OR_RETURN(const std::string text, TakeText(table, "definition", place));
+    const auto it = std::find(kDefinitionNames.begin(), kDefinitionNames.end(), text);
+    if (it == kDefinitionNames.end() || spec.type != DimensionType::kDiameter) {
+      return Fail(ErrorCode::kFormat,
+                  "{}: definition '{}', allowed for a diameter are GG, LP max, LP min, LP mean", place.text,
+                  text);
+    }
+    spec.definition = static_cast<SizeDefinition>(it - kDefinitionNames.begin());
+  }
+  const toml::array* sections = table["sections_mm"].as_array();
+  for (std::size_t i = 0; sections != nullptr && i < sections->size(); ++i) {
+    spec.sections_mm.push_back((*sections)[i].value_or(std::nan("")));
+    if (!std::isfinite(spec.sections_mm.back())) sections = nullptr, spec.sections_mm.clear();
+  }
+  const bool two_point = spec.definition != SizeDefinition::kLeastSquares;
+  if (two_point != table.contains("sections_mm") || two_point == spec.sections_mm.empty()) {
+    return Fail(ErrorCode::kFormat,
+                "{}: 'sections_mm', a list of numbers, is needed for an LP size and for nothing else",
+                place.text);
+  }
+  return {};
+}
+
 Status CheckDimension(const DimensionSpec& spec, const Place& place) {
   if (!(spec.lower_mm > 0 && spec.upper_mm > spec.lower_mm)) {
     return Fail(ErrorCode::kFormat, "{}: limits {} to {} mm, expected 0 < lower_mm < upper_mm", place.text,
@@ -88,13 +114,16 @@ Result<DimensionSpec> TakeDimension(const toml::table& table, const std::string&
   DimensionSpec spec;
   ASSIGN_OR_RETURN(spec.name, TakeText(table, "name", {file + ": a dimension"}));
   const Place place{fmt::format("{}: dimension '{}'", file, spec.name)};
-  RETURN_IF_ERROR(OnlyKeys(
-      table, {"name", "type", "faces", "datum", "lower_mm", "upper_mm", "expanded_uncertainty_mm"}, place));
+  RETURN_IF_ERROR(OnlyKeys(table,
+                           {"name", "type", "faces", "datum", "definition", "sections_mm", "lower_mm",
+                            "upper_mm", "expanded_uncertainty_mm"},
+                           place));
   ASSIGN_OR_RETURN(spec.type, TakeType(table, place));
   ASSIGN_OR_RETURN(spec.faces, TakeNames(table, "faces", place));
   if (table.contains("datum")) {
     ASSIGN_OR_RETURN(spec.datum, TakeNames(table, "datum", place));
   }
+  RETURN_IF_ERROR(TakeDefinition(table, place, spec));
   ASSIGN_OR_RETURN(spec.lower_mm, TakeNumber(table, "lower_mm", place));
   ASSIGN_OR_RETURN(spec.upper_mm, TakeNumber(table, "upper_mm", place));
   if (table.contains("expanded_uncertainty_mm")) {
@@ -191,6 +220,10 @@ Result<double> Nominal(const DimensionSpec& spec, const ModelBundle& model) {
 }
 
 }  // namespace
+
+const char* SizeDefinitionName(SizeDefinition definition) {
+  return kDefinitionNames[static_cast<std::size_t>(definition)];
+}
 
 const char* DimensionTypeName(DimensionType type) { return kTypeNames[static_cast<std::size_t>(type)]; }
 

@@ -17,13 +17,22 @@ enum class DimensionType { kLength, kWidth, kDiameter };
 // "length", "width", "diameter"
 const char* DimensionTypeName(DimensionType type);
 
+// What a diameter is, by the modifiers of ISO 14405-1: of the least-squares cylinder (GG), or the largest,
+// smallest or mean two-point size (LP with rank order) in given sections.
+enum class SizeDefinition { kLeastSquares, kTwoPointMax, kTwoPointMin, kTwoPointMean };
+
+// "GG", "LP max", "LP min", "LP mean"
+const char* SizeDefinitionName(SizeDefinition definition);
+
 // Units: mm, of the part at its reference temperature (the hot size).
 struct DimensionSpec {
   std::string name;
   DimensionType type = DimensionType::kLength;
   std::vector<std::string> faces;  // length, width: two planes; diameter: cylinders of one axis and radius
   std::vector<std::string> datum;  // length only: the cylinders whose axis it is measured along
-  double lower_mm = 0;             // limits of the size, absolute
+  SizeDefinition definition = SizeDefinition::kLeastSquares;  // of a diameter
+  std::vector<double> sections_mm;  // LP only: along the nominal axis, from the face's nominal point
+  double lower_mm = 0;              // limits of the size, absolute
   double upper_mm = 0;
   std::optional<double> expanded_uncertainty_mm;  // U at 95 %, where the station knows better than the fit
   double nominal_mm = 0;                          // computed from the model by BindFeatures()

@@ -155,21 +155,11 @@ TEST_F(DimensionsTest, PointsNearABorderBelongToNoFace) {
   const float y = 178.9F / 2;
   for (const float z : {26.0F, 28.0F, 42.0F, 59.0F})
     cloud.points.emplace_back(-500.0F, y + 0.2F, z);  // face: z 25..60
-  const auto selected = SelectFacePoints(cloud, *model_, {*face}, {});
+  const auto selector = FaceSelector::Build(*model_, {*face});
+  ASSERT_TRUE(selector.ok());
+  const auto selected = selector->Select(cloud, {});
   ASSERT_TRUE(selected.ok());
   EXPECT_EQ(selected->points[0].size(), 2U);
-}
-
-TEST_F(DimensionsTest, DeviationsAreSignedAndNaNFarAway) {
-  const auto surface = TriangleIndex::Build(model_->vertices, model_->triangles);
-  ASSERT_TRUE(surface.ok());
-  PointCloud cloud;
-  cloud.points = {{0, 0, 40.5F}, {0, 0, 39.5F}, {0, 0, 60}, {std::nanf(""), 0, 0}};
-  const auto deviations = SignedDeviations(cloud, *surface, 3, 1);
-  EXPECT_NEAR(deviations[0], 0.5, 1e-4);  // mm: single precision
-  EXPECT_NEAR(deviations[1], -0.5, 1e-4);
-  EXPECT_TRUE(std::isnan(deviations[2]));
-  EXPECT_TRUE(std::isnan(deviations[3]));
 }
 
 }  // namespace

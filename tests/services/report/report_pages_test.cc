@@ -33,6 +33,19 @@ std::size_t Count(const std::string& text, const std::string& part) {
   return count;
 }
 
+TEST(ReportPages, TellWhatAnUncertaintyIsMadeOf) {
+  PartReport report = SampleReport(12);
+  EXPECT_EQ(ReportHtml(report).find("<h2>Uncertainty</h2>"), std::string::npos);
+  report.dimensions[0].uncertainty_terms = {{"scatter <of> the points", 0.0123}, {"robot", 0.0045}};
+  const json dimension = json::parse(ReportJson(report))["dimensions"][0];
+  EXPECT_EQ(dimension["uncertainty_contributions"][1]["name"], "robot");
+  EXPECT_EQ(dimension["uncertainty_contributions"][1]["standard_mm"], 0.0045);
+  const std::string page = ReportHtml(report);
+  EXPECT_NE(page.find("<h2>Uncertainty</h2>"), std::string::npos);
+  EXPECT_NE(page.find("scatter &lt;of&gt; the points"), std::string::npos);
+  EXPECT_NE(page.find("0.0123"), std::string::npos);
+}
+
 TEST(ReportJson, HasExactlyItsFields) {
   const json report = json::parse(ReportJson(SampleReport(12)));
   using List = std::vector<std::string>;
@@ -40,8 +53,9 @@ TEST(ReportJson, HasExactlyItsFields) {
                                 "part", "reason", "reference_degc", "registration", "software_version",
                                 "station", "timing_s", "verdict", "verdict_time", "verdict_utime", "views"}));
   EXPECT_EQ(Keys(report["dimensions"][0]),
-            (List{"deviation_mm", "lower_mm", "measured_mm", "name", "nominal_mm", "points", "reason",
-                  "rejected_share", "temperature_degc", "uncertainty_mm", "upper_mm", "verdict"}));
+            (List{"definition", "deviation_mm", "lower_mm", "measured_mm", "name", "nominal_mm", "points",
+                  "reason", "rejected_share", "temperature_degc", "uncertainty_contributions",
+                  "uncertainty_mm", "upper_mm", "verdict"}));
   EXPECT_EQ(Keys(report["registration"]),
             (List{"foreign_share", "inlier_share", "iterations", "model_from_array", "reason", "rms_mm",
                   "shift_mm", "status", "turn_rad", "weakest_eigenvalue"}));

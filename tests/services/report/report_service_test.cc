@@ -207,15 +207,15 @@ TEST(ReportConfig, RefusesWhatIsWrong) {
     return ReportConfig::Load(file.value().Table("report"));
   };
   ASSERT_TRUE(load("").ok());
-  EXPECT_EQ(load("[report]\ntrend_parts = 30\n[report.uncertainty]\nscanner_mm = 0.05")->trend_parts, 30);
-  EXPECT_EQ(load("[report.uncertainty]\nscanner_mm = 0.05")->uncertainty.scanner_mm, 0.05);
+  EXPECT_EQ(load("[report]\ntrend_parts = 30\n[report.uncertainty]\nview_shift_mm = 0.05")->trend_parts, 30);
+  EXPECT_EQ(load("[report.uncertainty]\nview_shift_mm = 0.05")->uncertainty.view_shift_mm, 0.05);
   EXPECT_EQ(load("[report.dimensions]\nmax_form_sigma_mm = 0.2")->dimensions.fit.max_form_sigma_mm, 0.2);
   EXPECT_FALSE(load("[report.dimensions]\nmax_form_sigma_mm = 0.0").ok());
   EXPECT_FALSE(load("[report.dimensions]\nmax_form_sigma = 0.2").ok());
   EXPECT_FALSE(load("[report]\ntrend_parts = 2").ok());
   EXPECT_FALSE(load("[report]\npart_timout_s = 60.0").ok());
   EXPECT_FALSE(load("[report]\npart_timeout_s = 1.0\nloss_settle_s = 2.0").ok());
-  EXPECT_FALSE(load("[report.uncertainty]\nscanner_mm = nan").ok());
+  EXPECT_FALSE(load("[report.uncertainty]\nview_shift_mm = nan").ok());
 }
 
 }  // namespace

@@ -91,25 +91,69 @@ TEST(JudgePart, NothingShownIsNothingInspected) {
 }
 
 TEST(Uncertainty, IsTheRootOfTheSquares) {
-  const UncertaintyBudget budget{.view_matrix_mm = 0.03,
-                                 .scanner_mm = 0.0,
-                                 .refraction_mm = 0.04,
-                                 .temperature_k = 5.0,
-                                 .expansion_slope_per_k = 2e-5};
-  EXPECT_NEAR(ExpandedUncertaintyMm(budget, 0.0, 0.0), 2.0 * 0.05, 1e-12) << "mm, 3-4-5; rounding only";
-  EXPECT_NEAR(ExpandedUncertaintyMm(budget, 1200.0, 0.0), 2.0 * 0.13, 1e-12)
-      << "mm, 5-12-13 with 1200 mm * 1e-4";
-  EXPECT_TRUE(std::isnan(ExpandedUncertaintyMm(budget, 100.0, kNan)));
+  const std::vector<UncertaintyTerm> terms{{"a", 0.03}, {"b", 0.04}, {"c", 0.12}};
+  EXPECT_NEAR(ExpandedUncertaintyMm(terms), 2.0 * 0.13, 1e-12) << "mm, 3-4-5 and 5-12-13; rounding only";
+  EXPECT_TRUE(std::isnan(ExpandedUncertaintyMm(std::vector<UncertaintyTerm>{{"a", kNan}, {"b", 0.1}})));
 }
 
-TEST(Uncertainty, DefaultsOfTheAxle) {
+double TermMm(const std::vector<UncertaintyTerm>& terms, std::string_view name) {
+  for (const UncertaintyTerm& term : terms) {
+    if (term.name == name) return term.standard_mm;
+  }
+  ADD_FAILURE() << "no term " << name;
+  return kNan;
+}
+
+// A width of 100 mm between two views that look at it from both sides, 30 mm off the middle of what they see.
+TEST(Uncertainty, FollowsTheInfluenceOfTheViews) {
+  Influence influence;
+  for (const double side : {-1.0, 1.0}) {
+    ViewInfluence view;
+    view.shift = {side, 0, 0};
+    view.turn_mm = {0, 0, 30};
+    view.scale_mm = 10;
+    view.stretch_mm = 50;
+    influence.views.push_back(view);
+  }
+  influence.noise_mm = 0.001;
+  influence.form_mm = 0.002;
+  influence.patch = 0.5;
+  influence.outward = 2;
+  const UncertaintyBudget budget{.view_shift_mm = 0.03,
+                                 .view_turn_rad = 0.001,
+                                 .robot_shift_mm = 0.004,
+                                 .robot_turn_rad = 0.0,
+                                 .refraction_mm = 0.02,
+                                 .patch_mm = 0.01,
+                                 .surface_mm = 0.006,
+                                 .scanner_scale = 0.001,
+                                 .temperature_k = 5.0,
+                                 .view_temperature_k = 1.0,
+                                 .expansion_slope_per_k = 2e-5};
+  const auto terms = UncertaintyTerms(budget, influence, 100.0, 0.5);
+  const double kRounding = 1e-12;
+  EXPECT_EQ(TermMm(terms, "scatter of the points"), 0.001);
+  EXPECT_EQ(TermMm(terms, "form of the faces"), 0.002);
+  EXPECT_NEAR(TermMm(terms, "patches of a view"), 0.005, kRounding);
+  EXPECT_NEAR(TermMm(terms, "view matrices"), std::sqrt(2.0) * std::hypot(0.03, 0.03), kRounding);
+  EXPECT_NEAR(TermMm(terms, "robot"), std::sqrt(2.0) * 0.004, kRounding);
+  EXPECT_NEAR(TermMm(terms, "refraction"), std::sqrt(2.0) * 0.02, kRounding);
+  EXPECT_NEAR(TermMm(terms, "height of the surface"), 0.012, kRounding);
+  EXPECT_NEAR(TermMm(terms, "scale of the scanner"), 0.02, kRounding);
+  EXPECT_NEAR(TermMm(terms, "temperature of the part"), 0.01, kRounding);
+  EXPECT_NEAR(TermMm(terms, "temperature between views"), 50 * 2e-5 * std::sqrt(2.0), kRounding);
+}
+
+TEST(Uncertainty, DefaultsOfTheAxleWithoutKnowledgeOfItsViews) {
   const UncertaintyBudget budget;
   ASSERT_TRUE(budget.Check().ok());
-  EXPECT_NEAR(ExpandedUncertaintyMm(budget, 1888.0, 0.005), 0.2, 0.05)
-      << "mm, the budget of a hot length of 1888 mm";
-  EXPECT_NEAR(ExpandedUncertaintyMm(budget, 89.0, 0.01), 0.09, 0.02)
-      << "mm, the budget of a diameter of 89 mm";
-  EXPECT_FALSE(UncertaintyBudget{.scanner_mm = kNan}.Check().ok());
+  const auto of = [&](double size_mm, double fit_mm) {
+    return ExpandedUncertaintyMm(UncertaintyTerms(budget, {}, size_mm, fit_mm));
+  };
+  EXPECT_NEAR(of(1888.0, 0.005), 0.2, 0.05) << "mm, the budget of a hot length of 1888 mm";
+  EXPECT_NEAR(of(89.0, 0.01), 0.09, 0.02) << "mm, the budget of a diameter of 89 mm";
+  EXPECT_TRUE(std::isnan(of(89.0, kNan)));
+  EXPECT_FALSE(UncertaintyBudget{.scanner_scale = kNan}.Check().ok());
   EXPECT_FALSE(UncertaintyBudget{.temperature_k = -1.0}.Check().ok());
 }
 
