@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "services/common/features/simd_path.h"
+#include "services/common/simd_path.h"
 #include "services/common/geometry/point_cloud.h"
 #include "services/common/geometry/triangle_index.h"
 #include "services/common/result.h"

@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "services/common/features/simd_path.h"
+#include "services/common/simd_path.h"
 
 namespace forgescan {
 

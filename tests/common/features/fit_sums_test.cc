@@ -32,19 +32,12 @@ FitFrame Frame() {
   return {Eigen::Vector3d(801, 2, -103), turn.toRotationMatrix()};
 }
 
-std::vector<SimdPath> Paths() {
-  std::vector<SimdPath> paths{SimdPath::kPlain};
-  if (BestSimdPath() != SimdPath::kPlain) paths.push_back(SimdPath::kAvx2);
-  if (BestSimdPath() == SimdPath::kAvx512) paths.push_back(SimdPath::kAvx512);
-  return paths;
-}
-
 template <typename Shape>
 void ExpectEqualBytes(const Shape& shape) {
   const Points points = Scatter(12'345);
   const auto sums = SumRows(points, Frame(), shape, 9, SimdPath::kPlain);
   const auto residuals = AbsoluteResiduals(points, Frame(), shape, SimdPath::kPlain);
-  for (const SimdPath path : Paths()) {
+  for (const SimdPath path : AvailableSimdPaths()) {
     const auto other = SumRows(points, Frame(), shape, 9, path);
     EXPECT_EQ(std::memcmp(&sums.normal, &other.normal, sizeof sums.normal), 0);
     EXPECT_EQ(std::memcmp(&sums.right, &other.right, sizeof sums.right), 0);
