@@ -121,14 +121,14 @@ TEST_F(ExperimentPage, TheCommandWritesAndRefuses) {
     return RunCommand(std::string("cd ") + FORGESCAN_SOURCE_DIR + " && " + FORGESCAN_BIN_DIR +
                       "/forgescan experiment " + arguments);
   };
-  const CommandOutput once = call("noise --runs 200 --out " + folder_.string());
+  const CommandOutput once = call("gamma --runs 1 --out " + folder_.string());
   EXPECT_EQ(once.exit_code, 0) << once.text;
-  EXPECT_THAT(once.text, HasSubstr("coordinate of all three"));
-  const std::string page = Read("experiments.md"), svg = Read("experiments/noise.svg");
-  EXPECT_THAT(page, HasSubstr("forgescan experiment noise --seed 1 --runs 200"));
-  EXPECT_EQ(call("noise --runs 200 --out " + folder_.string()).exit_code, 0);
+  EXPECT_THAT(once.text, HasSubstr("reduced, linearised"));
+  const std::string page = Read("experiments.md"), svg = Read("experiments/gamma.svg");
+  EXPECT_THAT(page, HasSubstr("forgescan experiment gamma --seed 1 --runs 1"));
+  EXPECT_EQ(call("gamma --runs 1 --out " + folder_.string()).exit_code, 0);
   EXPECT_EQ(Read("experiments.md"), page);
-  EXPECT_EQ(Read("experiments/noise.svg"), svg);
+  EXPECT_EQ(Read("experiments/gamma.svg"), svg);
   EXPECT_NE(call("nothing --out " + folder_.string()).exit_code, 0);
   EXPECT_NE(call("noise --out " + (folder_ / "nowhere").string()).exit_code, 0);
   EXPECT_NE(call("noise --runs nan --out " + folder_.string()).exit_code, 0);

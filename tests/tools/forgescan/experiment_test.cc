@@ -90,28 +90,28 @@ TEST(Experiment, GammaTellsHarmonicsAndErrors) {
 }
 
 TEST(Experiment, ClutterFindsThePoseOrRefuses) {
-  const ExperimentReport report = RunTwice("clutter", 2);
+  const ExperimentReport report = RunTwice("clutter", 1);
   const Table& table = report.tables.at(0);
   ASSERT_EQ(table.rows.size(), 6u);
   for (std::size_t row = 0; row < 4; ++row) {  // to 35 %
-    EXPECT_EQ(Number(table, row, "right"), 2) << "row " << row;
+    EXPECT_EQ(Number(table, row, "right"), 1) << "row " << row;
   }
   for (std::size_t row = 0; row < 6; ++row) EXPECT_EQ(Number(table, row, "wrong"), 0) << "row " << row;
 }
 
 TEST(Experiment, Fig10OursIsBetterThanTheTrimmedIcp) {
-  const ExperimentReport report = RunTwice("fig10", 2);
+  const ExperimentReport report = RunTwice("fig10", 1);
   const Table& table = report.tables.at(0);
   for (const std::size_t part : {0, 3}) {
-    EXPECT_EQ(Number(table, part, "right"), 2);
+    EXPECT_EQ(Number(table, part, "right"), 1);
     for (const std::size_t trimmed : {part + 1, part + 2}) {
       EXPECT_LT(Number(table, part, "worst mm"), Number(table, trimmed, "median error mm"));
     }
   }
 }
 
-// So that the comparison is fair: without clutter the trimmed ICP comes as near as its samples, 2 mm apart,
-// let it.
+// So that the comparison is fair: without clutter the trimmed ICP comes home. 0.05 mm at the corner of a part
+// of 300 mm: 5000 points of 0.03 mm noise, and a stop when the mean square changes by less than 1e-5.
 TEST(Experiment, TheTrimmedIcpWorksWithoutClutter) {
   const auto cover = MakeCoverOnPlatform();
   ASSERT_TRUE(cover.ok()) << cover.error().message;
@@ -119,7 +119,7 @@ TEST(Experiment, TheTrimmedIcpWorksWithoutClutter) {
   request.points = 10'000;
   request.foreign_share = 0;
   ExperimentOptions options = Small(3);
-  for (const double corner_mm : RunTrimmed(*cover, request, 1, options)) EXPECT_LT(corner_mm, 0.5);
+  for (const double corner_mm : RunTrimmed(*cover, request, 1, options)) EXPECT_LT(corner_mm, 0.05);
 }
 
 TEST(Experiment, Fig7FollowsTheTheory) {
@@ -164,7 +164,7 @@ TEST(Experiment, Fig15FollowsTheWear) {
 }
 
 TEST(Experiment, NamesWhatIsWrongAndWorksAgain) {
-  ExperimentOptions options = Small(2);
+  ExperimentOptions options = Small(3);
   options.cell = "no such file";
   for (const char* name : {"clutter", "fig10", "fig7", "balls", "fig13-table1", "fig15"}) {
     const auto report = Named(name).run(options);

@@ -1,6 +1,7 @@
 #include "tools/forgescan/experiment/ball_fit.h"
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <cmath>
 
 #include "services/common/features/sphere_fit.h"
@@ -32,7 +33,9 @@ Eigen::Vector3d CenterOfKnownBall(const std::vector<Eigen::Vector3d>& points, Ei
   for (int round = 0; round < kRounds; ++round) {
     std::vector<double> sorted;
     for (const Eigen::Vector3d& p : points) sorted.push_back(std::abs((p - center).norm() - kBallRadiusMm));
-    const double limit_mm = RejectionLimit(sorted, 3);
+    const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+    std::nth_element(sorted.begin(), middle, sorted.end());
+    const double limit_mm = 3 * 1.4826 * *middle;
     Eigen::Matrix3d matrix = Eigen::Matrix3d::Zero();
     Eigen::Vector3d right = Eigen::Vector3d::Zero();
     for (const Eigen::Vector3d& p : points) {

@@ -3,6 +3,9 @@
 #include <cmath>
 #include <numbers>
 
+#include "tools/virtual_station/scene.h"
+#include "tools/virtual_station/teaching.h"
+
 namespace forgescan {
 namespace {
 
@@ -50,6 +53,28 @@ PartState BallPart() {
   part.start_degc = 925;  // never used: the balls are cold
   for (const Eigen::Vector3d& center : BallCenters()) Append(BallMesh(center), part.mesh_in_part);
   return part;
+}
+
+double DistanceByCalibration(const CellConfig& config) {
+  const Rig calibrated = CalibratedRig(config);
+  const Rectification rectification = Rectify(calibrated);
+  const Eigen::Isometry3d rig_from_array =
+      TaughtRigPose(config.views.front(), config.working_distance_mm).inverse();
+  std::array<Eigen::Vector3d, 2> seen;
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    const auto ray = [&](const PinholeCamera& truth, const Lens& written, const Eigen::Matrix3d& rectified) {
+      const Eigen::Vector3d p_in_camera = truth.camera_from_rig * (rig_from_array * BallCenters()[i]);
+      const Eigen::Vector2d slope = Unproject(written, Project(truth.lens, p_in_camera));
+      const Eigen::Vector3d direction = rectified * slope.homogeneous();
+      return Eigen::Vector3d(direction / direction.z());
+    };
+    const Eigen::Vector3d left =
+        ray(config.rig.left, calibrated.left.lens, rectification.rectified_from_left);
+    const Eigen::Vector3d right =
+        ray(config.rig.right, calibrated.right.lens, rectification.rectified_from_right);
+    seen[i] = left * (rectification.baseline_mm / (left.x() - right.x()));
+  }
+  return (seen[1] - seen[0]).norm();
 }
 
 }  // namespace forgescan

@@ -19,4 +19,8 @@ CellConfig BallCell(CellConfig config);
 // Both balls as a part; chord error 0.0004 mm.
 PartState BallPart();
 
+// The distance of the centres as cameras without noise would find it by the calibration that commissioning
+// wrote: the calibration's own share of the error, which stays the same from scan to scan. Units: mm.
+double DistanceByCalibration(const CellConfig& config);
+
 }  // namespace forgescan

@@ -14,6 +14,7 @@ namespace forgescan {
 namespace {
 
 constexpr int kSeries = 2000;
+constexpr double kDistanceGoalMm = 0.010;
 
 using BallPair = std::array<Eigen::Vector3d, 2>;
 
@@ -141,6 +142,22 @@ Result<std::vector<double>> RobotSeries(const CellConfig& config, const Experime
   return radius_mm;
 }
 
+// What the calibration alone makes of the distance, here and over many stations of the same care.
+std::string CalibrationRemark(CellConfig config) {
+  constexpr int kStations = 500;
+  const double own_mm = DistanceByCalibration(config) - kBallDistanceMm;
+  int within = 0;
+  for (int station = 0; station < kStations; ++station) {
+    config.seed = static_cast<std::uint64_t>(station + 1);
+    within += std::abs(DistanceByCalibration(config) - kBallDistanceMm) <= kDistanceGoalMm ? 1 : 0;
+  }
+  return fmt::format(
+      "Of the distance's error {:+.4f} mm are the written calibration's (truth: its rays, without noise); of "
+      "{} "
+      "calibrations of the cell's care {:.0f} % are within {} mm.",
+      own_mm, kStations, 100.0 * within / kStations, kDistanceGoalMm);
+}
+
 Table VisitTable(const std::vector<Visit>& visits, double& worst_mm) {
   Table table{{"scan", "distance mm", "error mm", "free radius 1 mm", "free radius 2 mm"}, {}};
   for (std::size_t i = 0; i < visits.size(); ++i) {
@@ -231,7 +248,7 @@ Result<ExperimentReport> RunBalls(const ExperimentOptions& options) {
   report.goals = {
       {"envelope of the centres", std::max(measured.first_mm, measured.second_mm), 0.011, "mm"},
       {"full cone of the centre lines", measured.cone_rad, 1.55e-4, "rad"},
-      {"distance of the balls, worst error", worst_mm, 0.010, "mm"},
+      {"distance of the balls, worst error", worst_mm, kDistanceGoalMm, "mm"},
       {"scanner's own share of the envelope", std::max(scanner.first_mm, scanner.second_mm), 0.003, "mm"}};
   ASSIGN_OR_RETURN(const std::vector<double> series, RobotSeries(config, options));
   report.remarks.push_back(fmt::format(
@@ -240,6 +257,7 @@ Result<ExperimentReport> RunBalls(const ExperimentOptions& options) {
       "{:.4f} to {:.4f} mm in 90 % of them: whether the goal is met is mostly the luck of the ten visits.",
       series[series.size() / 2], kSeries, options.runs, series[series.size() / 20],
       series[series.size() - series.size() / 20]));
+  report.remarks.push_back(CalibrationRemark(config));
   report.svg = SvgFile("balls", 900, 470,
                        DrawChart(CenterChart(visits, 0), {0, 0, 450, 470}) +
                            DrawChart(CenterChart(visits, 1), {450, 0, 450, 470}));

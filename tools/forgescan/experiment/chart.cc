@@ -16,6 +16,7 @@ namespace {
 constexpr std::array kColours = {"#2b5fa8", "#b8281d", "#1b7f4d", "#b56a00", "#6b3fa0", "#5b6774"};
 constexpr double kLegendRow = 18;
 constexpr double kDotRadius = 3;
+constexpr double kLeftMargin = 82;  // label and numbers of seven digits
 
 const char* ColourOf(const Series& series) {
   return kColours[static_cast<std::size_t>(series.colour) % kColours.size()];
@@ -110,7 +111,7 @@ class ChartPainter {
       if (series.mark == Mark::kBars) y.Add(0);
     }
     for (const GoalLine& goal : chart.goals) (goal.is_x ? x : y).Add(goal.at);
-    x_ = MakeAxis(chart.x, x, panel.left + 72, panel.left + panel.width - 16);
+    x_ = MakeAxis(chart.x, x, panel.left + kLeftMargin, panel.left + panel.width - 16);
     y_ = MakeAxis(chart.y, y, panel.top + panel.height - 50,
                   panel.top + 34 + kLegendRow * static_cast<double>(legend_rows_));
   }
@@ -127,13 +128,13 @@ class ChartPainter {
  private:
   void PlaceLegend() {
     constexpr double kCharacter = 6.9, kSwatch = 34;
-    double x = panel_.left + 72, y = panel_.top + 38;
+    double x = panel_.left + kLeftMargin, y = panel_.top + 38;
     for (const Series& series : chart_.series) {
       if (series.label.empty()) continue;
       const double width = kSwatch + kCharacter * static_cast<double>(series.label.size()) + 14;
       if (legend_rows_ == 0) legend_rows_ = 1;
-      if (x + width > panel_.left + panel_.width && x > panel_.left + 72) {
-        x = panel_.left + 72;
+      if (x + width > panel_.left + panel_.width && x > panel_.left + kLeftMargin) {
+        x = panel_.left + kLeftMargin;
         y += kLegendRow;
         ++legend_rows_;
       }
@@ -181,9 +182,9 @@ class ChartPainter {
     svg += Line(x_.start_px, y_.start_px, x_.start_px, y_.end_px, "stroke=\"#5b6774\"");
     const double middle = 0.5 * (y_.start_px + y_.end_px);
     svg += Text(0.5 * (x_.start_px + x_.end_px), y_.start_px + 38, "text-anchor=\"middle\"", chart_.x.label);
-    svg += Text(panel_.left + 16, middle,
+    svg += Text(panel_.left + 13, middle,
                 fmt::format("text-anchor=\"middle\" transform=\"rotate(-90 {:.1f} {:.1f})\"",
-                            panel_.left + 16, middle)
+                            panel_.left + 13, middle)
                     .c_str(),
                 chart_.y.label);
     return svg;

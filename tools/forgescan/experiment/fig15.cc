@@ -95,7 +95,7 @@ Result<Table> SlopeTable(const Lot& lot, const PartConfig& config, ExperimentRep
 std::string TrendPicture(const Lot& lot) {
   std::string body;
   for (std::size_t i = 0; i < lot.names.size(); ++i) {
-    Chart chart{lot.names[i], {"part"}, {"mm"}, {}, {}};
+    Chart chart{lot.names[i], {"part"}, {"size, mm"}, {}, {}};
     Series truth{"true", Mark::kDashed, {}, {}, 2}, measured{"measured", Mark::kLineDots, {}, {}, 0};
     for (const TrendPoint& point : lot.truth[i]) {
       truth.x.push_back(point.part_index + 1);

@@ -51,7 +51,7 @@ std::vector<double> RunTrimmed(const Workpiece& workpiece, const ScanRequest& re
   trimmed.overlap_share = overlap_share;
   return RunAll(workpiece, request, options, [&](const StartCase& start) {
     const auto result =
-        AlignTrimmed(start.scan.points, workpiece.model, Eigen::Isometry3d::Identity(), trimmed);
+        AlignTrimmed(start.scan.points, workpiece.model.surface(), Eigen::Isometry3d::Identity(), trimmed);
     return WorstCornerMm(result.model_from_scan * start.scan_from_model, workpiece.model);
   });
 }

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "tools/virtual_station/commissioning.h"
+#include "tools/virtual_station/teaching.h"
 
 namespace forgescan {
 namespace {
@@ -86,7 +87,7 @@ std::vector<int> IndexByPixel(const PointCloud& cloud, const StereoRig& rig) {
 
 // sigma / B from the four frames of the finest frequency.
 double NoiseShare(const std::vector<cv::Mat>& frames, const FringeFrequency& finest, const CameraNoise& noise,
-                  const cv::Vec2f& raw) {
+                  const Eigen::Vector2d& raw) {
   std::array<double, kSteps> grey{};
   for (std::size_t i = 0; i < grey.size(); ++i) {
     const cv::Mat& frame = frames[static_cast<std::size_t>(finest.frame_index[i])];
@@ -117,6 +118,9 @@ Result<SetComparer> SetComparer::Create(const CellConfig& config, const Experime
   ASSIGN_OR_RETURN(comparer.files_, Commission(config, options));
   comparer.full_ = FullSet(comparer.files_.pattern);
   ASSIGN_OR_RETURN(comparer.reduced_of_full_, FramesOfReduced(comparer.files_.pattern, comparer.full_));
+  const Rig calibrated = CalibratedRig(config);  // as commissioning has written it
+  comparer.left_lens_ = calibrated.left.lens;
+  comparer.left_from_rectified_ = Rectify(calibrated).rectified_from_left.transpose();
   const VirtualCell cell(config, options.threads);
   ASSIGN_OR_RETURN(const PartState part, cell.Part(0));
   ASSIGN_OR_RETURN(const ViewState view, cell.View(part, kView));
@@ -124,6 +128,10 @@ Result<SetComparer> SetComparer::Create(const CellConfig& config, const Experime
     ASSIGN_OR_RETURN(comparer.maps_[static_cast<std::size_t>(side)], cell.Map(part, view, side));
   }
   return comparer;
+}
+
+Eigen::Vector2d SetComparer::RawPixel(const Eigen::Vector3f& p_in_camera) const {
+  return Project(left_lens_, left_from_rectified_ * p_in_camera.cast<double>());
 }
 
 Result<Comparison> SetComparer::Compare(double noise_factor) const {
@@ -177,8 +185,9 @@ Result<Comparison> SetComparer::Match(const CellConfig& config, const Reconstruc
     const double predicted =
         std::sqrt(std::max(reduced_sigma * reduced_sigma - full_sigma * full_sigma, 1e-12));
     const int x = pixel % size.width_px, y = pixel / size.width_px;
-    comparison.points.push_back({x, y, reduced_mm - full_mm, predicted,
-                                 NoiseShare(full[0], finest, settings.noise, rig.left_map(y, x))});
+    comparison.points.push_back(
+        {x, y, reduced_mm - full_mm, predicted,
+         NoiseShare(full[0], finest, settings.noise, RawPixel(b.cloud_in_camera.points[i]))});
   }
   comparison.only_full = a.cloud_in_camera.size() - comparison.points.size();
   comparison.median_noise_share = MedianShare(comparison.points);

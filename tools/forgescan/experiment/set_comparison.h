@@ -36,7 +36,12 @@ class SetComparer {
   Result<Comparison> Match(const CellConfig& config, const ReconstructionConfig& settings,
                            const std::array<std::vector<cv::Mat>, 2>& full) const;
 
+  // Raw left pixel of a point in the rectified left camera, by the written calibration.
+  Eigen::Vector2d RawPixel(const Eigen::Vector3f& p_in_camera) const;
+
   CellConfig config_;
+  Lens left_lens_;
+  Eigen::Matrix3d left_from_rectified_ = Eigen::Matrix3d::Identity();
   int threads_ = 1;
   StationFiles files_;
   PatternSet full_;

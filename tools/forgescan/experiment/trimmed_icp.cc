@@ -2,50 +2,68 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+#include <limits>
 
 namespace forgescan {
 namespace {
 
-// Indices of the nearest pairs; of equals the earlier one.
-std::vector<std::size_t> NearestPairs(const std::vector<NearestSample>& pairs, double share) {
-  std::vector<std::size_t> order(pairs.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::stable_sort(order.begin(), order.end(), [&pairs](std::size_t a, std::size_t b) {
-    return pairs[a].distance_mm < pairs[b].distance_mm;
-  });
-  order.resize(static_cast<std::size_t>(share * static_cast<double>(order.size())));
-  return order;
+struct SurfacePair {
+  Eigen::Vector3d point, foot;
+  float distance_mm;
+};
+
+// Each point with the nearest one of the surface. hints: the triangles of the step before, which are near.
+std::vector<SurfacePair> PairAll(const std::vector<Eigen::Vector3d>& scan, const TriangleIndex& surface,
+                                 const Eigen::Isometry3d& model_from_scan,
+                                 std::vector<std::uint32_t>& hints) {
+  std::vector<SurfacePair> pairs;
+  for (std::size_t i = 0; i < scan.size(); ++i) {
+    const Eigen::Vector3d point = model_from_scan * scan[i];
+    const auto nearest = surface.Find(point.cast<float>(), std::numeric_limits<float>::max(), hints[i]);
+    if (!nearest) continue;  // a point that is not finite
+    hints[i] = nearest->triangle;
+    pairs.push_back({point, nearest->foot.cast<double>(), nearest->distance_mm});
+  }
+  return pairs;
+}
+
+struct Step {
+  Eigen::Isometry3d moved_from_before;
+  double mean_square = 0;
+};
+
+// The rigid motion between the nearest share of the pairs; of equally near ones the earlier.
+Step MoveNearest(std::vector<SurfacePair> pairs, double share) {
+  std::stable_sort(pairs.begin(), pairs.end(),
+                   [](const SurfacePair& a, const SurfacePair& b) { return a.distance_mm < b.distance_mm; });
+  const auto kept = static_cast<Eigen::Index>(share * static_cast<double>(pairs.size()));
+  Eigen::Matrix3Xd from(3, kept), to(3, kept);
+  for (Eigen::Index i = 0; i < kept; ++i) {
+    from.col(i) = pairs[static_cast<std::size_t>(i)].point;
+    to.col(i) = pairs[static_cast<std::size_t>(i)].foot;
+  }
+  const double square = (from - to).squaredNorm() / static_cast<double>(kept);
+  return {Eigen::Isometry3d(Eigen::umeyama(from, to, false)), square};
 }
 
 }  // namespace
 
-TrimmedIcpResult AlignTrimmed(const std::vector<Eigen::Vector3f>& scan, const RegistrationModel& model,
+TrimmedIcpResult AlignTrimmed(const std::vector<Eigen::Vector3f>& scan, const TriangleIndex& surface,
                               const Eigen::Isometry3d& start, const TrimmedIcpOptions& options) {
   const std::size_t stride = std::max<std::size_t>(1, scan.size() / options.points);
+  std::vector<Eigen::Vector3d> sample;
+  for (std::size_t i = 0; i < scan.size(); i += stride) sample.push_back(scan[i].cast<double>());
+  std::vector<std::uint32_t> hints(sample.size(), TriangleIndex::kNoTriangle);
   TrimmedIcpResult result{start, 0, 0};
   double last_square = std::numeric_limits<double>::infinity();
   while (result.iterations < options.max_iterations) {
-    std::vector<Eigen::Vector3f> moved;
-    for (std::size_t i = 0; i < scan.size(); i += stride) {
-      moved.push_back((result.model_from_scan * scan[i].cast<double>()).cast<float>());
-    }
-    const std::vector<NearestSample> pairs = model.FindSamples(moved);
-    const std::vector<std::size_t> kept = NearestPairs(pairs, options.overlap_share);
-    Eigen::Matrix3Xd from(3, kept.size()), to(3, kept.size());
-    double square = 0;
-    for (std::size_t i = 0; i < kept.size(); ++i) {
-      const auto column = static_cast<Eigen::Index>(i);
-      from.col(column) = moved[kept[i]].cast<double>();
-      to.col(column) = model.SamplePoint(pairs[kept[i]].sample).cast<double>();
-      square += (from.col(column) - to.col(column)).squaredNorm() / static_cast<double>(kept.size());
-    }
-    const Eigen::Isometry3d step(Eigen::umeyama(from, to, false));
-    result.model_from_scan = step * result.model_from_scan;
-    result.rms_mm = std::sqrt(square);
+    const Step step =
+        MoveNearest(PairAll(sample, surface, result.model_from_scan, hints), options.overlap_share);
+    result.model_from_scan = step.moved_from_before * result.model_from_scan;
+    result.rms_mm = std::sqrt(step.mean_square);
     ++result.iterations;
-    if (std::abs(last_square - square) <= options.stop_share * square) break;
-    last_square = square;
+    if (std::abs(last_square - step.mean_square) <= options.stop_share * step.mean_square) break;
+    last_square = step.mean_square;
   }
   return result;
 }

@@ -4,7 +4,7 @@
 #include <Eigen/Geometry>
 #include <vector>
 
-#include "services/registration/registration_model.h"
+#include "services/common/geometry/triangle_index.h"
 
 namespace forgescan {
 
@@ -21,10 +21,10 @@ struct TrimmedIcpResult {
   double rms_mm = 0;  // of the kept pairs
 };
 
-// Nearest model sample for each point, the nearest share of the pairs, rigid motion between them (Umeyama),
-// again until the mean square rests. Source: Chetverikov et al., The Trimmed Iterative Closest Point
-// Algorithm, ICPR 2002. Knows no refusal: it always answers.
-TrimmedIcpResult AlignTrimmed(const std::vector<Eigen::Vector3f>& scan, const RegistrationModel& model,
+// Nearest point of the surface for each point, the nearest share of the pairs, rigid motion between them
+// (Umeyama), again until the mean square rests. Source: Chetverikov et al., The Trimmed Iterative Closest
+// Point Algorithm, ICPR 2002. Frames: surface in the model's, mm. Knows no refusal: it always answers.
+TrimmedIcpResult AlignTrimmed(const std::vector<Eigen::Vector3f>& scan, const TriangleIndex& surface,
                               const Eigen::Isometry3d& start, const TrimmedIcpOptions& options);
 
 }  // namespace forgescan

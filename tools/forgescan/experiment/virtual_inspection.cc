@@ -6,7 +6,6 @@
 #include "services/common/model/model_import.h"
 #include "services/common/output_file.h"
 #include "services/common/service/station.h"
-#include "services/reconstruction/thin_cloud.h"
 #include "services/registration/classify.h"
 #include "services/registration/icp.h"
 #include "services/report/report_config.h"
@@ -44,6 +43,18 @@ std::vector<cv::Mat> Render(const VirtualCell& cell, const GeometryMap& map, con
                             int threads) {
   const ImageKey key{cell.config().seed, view.part, view.view, view.visit, side, 0};
   return ExposeAll(map, cell.config(), cell.Patterns(ProjectedSet::kReduced), key, threads);
+}
+
+// As the service publishes them.
+PointCloud EveryNth(const PointCloud& cloud, int n, int view) {
+  PointCloud thin;
+  for (std::size_t i = 0; i < cloud.size(); i += static_cast<std::size_t>(n)) {
+    thin.points.push_back(cloud.points[i]);
+    thin.normals.push_back(cloud.normals[i]);
+    thin.sigma_mm.push_back(cloud.sigma_mm[i]);
+  }
+  thin.view.assign(thin.size(), static_cast<std::uint16_t>(view));
+  return thin;
 }
 
 PointCloud PartInModel(const PointCloud& cloud, const std::vector<std::uint32_t>& part,
@@ -118,7 +129,7 @@ Result<ViewCloud> VirtualInspection::Scan(const PartState& part, const ViewState
   }
   return ViewCloud{
       view.view, view.pyrometer_degc,
-      EveryNthPoint(result->cloud_in_camera, files_.reconstruction.publish_every_nth_point, view.view)};
+      EveryNth(result->cloud_in_camera, files_.reconstruction.publish_every_nth_point, view.view)};
 }
 
 Result<InspectedPart> VirtualInspection::Measure(const std::vector<ViewCloud>& views,
