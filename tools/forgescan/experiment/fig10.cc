@@ -58,10 +58,8 @@ Result<ExperimentReport> RunFig10(const ExperimentOptions& options) {
   report.question = fmt::format(
       "Two parts with what the paper's Fig. 10 has about them, {} points of 0.03 mm noise, {} random starts "
       "each, off by 10 mm and 3 degrees. The trimmed ICP (nearest point of the surface, nearest share of the "
-      "pairs, "
-      "rigid motion) is told the true share of the part's points, or guesses {:.0f} %. Truth: the pose the "
-      "scan "
-      "was moved by. Error: of the worst corner of the part's box; right is below {} mm.",
+      "pairs, rigid motion) is told the true share of the part's points, or guesses {:.0f} %. Truth: the "
+      "pose the scan was moved by. Error: of the worst corner of the part's box; right is below {} mm.",
       kPoints, options.runs, 100 * kGuessedShare, kRightMm);
   Table table{{"part", "method", "right", "below 1 mm", "wrong", "refused", "median error mm", "worst mm"},
               {}};

@@ -122,18 +122,15 @@ Result<ExperimentReport> RunFig15(const ExperimentOptions& options) {
   ExperimentReport report;
   report.question = fmt::format(
       "{} hot axles one after the other from about {} degC, inspected from ten views while they cool, with "
-      "sizes "
-      "that scatter from part to part by {} (length), {} (plates) and {} mm (cylinders) about a die that "
-      "wears. "
-      "Truth: the sizes that were rendered, at {} degC. The trend is the report's own.",
+      "sizes that scatter from part to part by {} (length), {} (plates) and {} mm (cylinders) about a die "
+      "that wears. Truth: the sizes that were rendered, at {} degC. The trend is the report's own.",
       options.runs, config.heat.start_degc, config.part.length_sd_mm, config.part.plate_sd_mm,
       config.part.cylinder_sd_mm, config.heat.reference_degc);
   ASSIGN_OR_RETURN(Table table, SlopeTable(lot, config.part, report));
   report.tables.push_back(std::move(table));
   report.remarks.emplace_back(
       "Whether a trend of nine parts is found depends on the scatter of the parts themselves; the goal is on "
-      "what "
-      "the inspection adds: the slope of the measured sizes against the slope of the true ones.");
+      "what the inspection adds: the slope of the measured sizes against the slope of the true ones.");
   report.svg = TrendPicture(lot);
   return report;
 }

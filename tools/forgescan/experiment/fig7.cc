@@ -143,10 +143,8 @@ Result<ExperimentReport> RunFig7(const ExperimentOptions& options) {
   report.question = fmt::format(
       "One view of the axle, exposed with all 12 frames of the full set at {} levels of camera noise, and "
       "reconstructed from the 12 and from the 7 of them that make the reduced set. Share of the points "
-      "within {} mm "
-      "of each other by sigma/B at their pixel. Theory: the variance of a difference is that of the reduced "
-      "set less "
-      "that of the full one, both as predicted for the point.",
+      "within {} mm of each other by sigma/B at their pixel. Theory: the variance of a difference is that of "
+      "the reduced set less that of the full one, both as predicted for the point.",
       options.runs, kWithinMm);
   Table table{{"geometry", "sigma/B", "points", "within 0.02 mm", "theory", "rms difference mm", "theory mm"},
               {}};
@@ -170,8 +168,7 @@ Result<ExperimentReport> RunFig7(const ExperimentOptions& options) {
                        DrawPicture(picture, {0, 0, 450, 440}) + DrawChart(chart, {450, 0, 450, 440}));
   report.remarks.push_back(
       fmt::format("Of the points at the map's noise {} are in the full set's cloud alone and {} in the "
-                  "reduced set's: what the "
-                  "masks leave out.",
+                  "reduced set's: what the masks leave out.",
                   wanted.shown.only_full, wanted.shown.only_reduced));
   return report;
 }

@@ -179,8 +179,7 @@ Result<ExperimentReport> RunGamma(const ExperimentOptions& options) {
   report.remarks.emplace_back(
       "Both cameras see the same pattern: an error that depends on the phase alone moves a surface point's "
       "phase equally in both, so it does not shift the points of the stereo pair; it weakens fringe orders "
-      "and "
-      "the projector check.");
+      "and the projector check.");
   return report;
 }
 

@@ -156,6 +156,12 @@ Fused MeasureFused(const SetOfFrames& set, const ExperimentOptions& options) {
   return fused;
 }
 
+std::vector<std::string> FusedRow(const SetOfFrames& set, const Fused& fused) {
+  return {set.name, "coordinate of all three", fmt::format("{:.3f}", std::sqrt(fused.bound)),
+          fmt::format("{:.3f}", std::sqrt(fused.measured)),
+          fmt::format("{:+.1f} %", 100 * (std::sqrt(fused.measured / fused.bound) - 1))};
+}
+
 struct Decoded {
   double valid_share = 0, order_error_rate = 0, rms_px = 0, predicted_px = 0;
 };
@@ -226,11 +232,9 @@ std::vector<Series> SeriesOf(const std::array<Curve, kFrequencies>& curves, bool
 }  // namespace
 
 Result<ExperimentReport> RunNoise(const ExperimentOptions& options) {
-  std::vector<SetOfFrames> sets;
-  ASSIGN_OR_RETURN(SetOfFrames full, Make("full, 4-4-4", Background::kOwn));
-  ASSIGN_OR_RETURN(SetOfFrames reduced, Make("reduced, 3-2-2", Background::kShared));
-  sets.push_back(std::move(full));
-  sets.push_back(std::move(reduced));
+  ASSIGN_OR_RETURN(const SetOfFrames full, Make("full, 4-4-4", Background::kOwn));
+  ASSIGN_OR_RETURN(const SetOfFrames reduced, Make("reduced, 3-2-2", Background::kShared));
+  const std::vector<SetOfFrames> sets = {full, reduced};
   ExperimentReport report;
   report.question = fmt::format(
       "Phases of {} draws of Gaussian noise in each of {} bins of phase, estimated by the decoder's own "
@@ -238,8 +242,9 @@ Result<ExperimentReport> RunNoise(const ExperimentOptions& options) {
       "phases). The noise of a phase is given over sigma/B, sigma the noise of a grey value.",
       options.runs, kBins);
   Table table{{"set", "unknown", "bound", "measured", "worst bin against bound"}, {}};
-  Chart chart{
-      "Phase noise by phase", {"phase, degrees"}, {"sigma of a phase over sigma/B", false, 0.0}, {}, {}};
+  Chart chart{"Phase noise by phase",
+              {"phase, degrees", false, 0.0, 360.0},
+              {"sigma of a phase over sigma/B", false, 0.0, 1.6}};
   double worst_percent = 0;
   for (const SetOfFrames& set : sets) {
     const auto curves = MeasureBins(set, options);
@@ -250,10 +255,7 @@ Result<ExperimentReport> RunNoise(const ExperimentOptions& options) {
                             fmt::format("{:.1f} %", curves[j].worst_percent)});
       worst_percent = std::max(worst_percent, curves[j].worst_percent);
     }
-    const Fused fused = MeasureFused(set, options);
-    table.rows.push_back({set.name, "coordinate of all three", fmt::format("{:.3f}", std::sqrt(fused.bound)),
-                          fmt::format("{:.3f}", std::sqrt(fused.measured)),
-                          fmt::format("{:+.1f} %", 100 * (std::sqrt(fused.measured / fused.bound) - 1))});
+    table.rows.push_back(FusedRow(set, MeasureFused(set, options)));
     for (Series& series : SeriesOf(curves, set.pattern.background == Background::kOwn)) {
       chart.series.push_back(std::move(series));
     }

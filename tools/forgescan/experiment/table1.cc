@@ -160,8 +160,7 @@ Table SummaryTable(const Inspections& all, const AxleSize& size, ExperimentRepor
   const double gap = WidestGap(paper);
   report.remarks.push_back(
       fmt::format("The paper's 11 total lengths have a range of {:.2f} mm and a widest gap of {:.2f} sigma, "
-                  "of which 11 Gaussian "
-                  "values have a chance of {:.4f}: two states.",
+                  "of which 11 Gaussian values have a chance of {:.4f}: two states.",
                   Range(paper), gap, GapChance(gap, paper.size(), seed)));
   return table;
 }
@@ -223,12 +222,10 @@ Result<ExperimentReport> RunTable1(const ExperimentOptions& options) {
   ExperimentReport report;
   report.question = fmt::format(
       "One cold axle, laid down {} times within +-{} mm and +-{} degrees, inspected each time from the ten "
-      "views "
-      "as the services do it. The robot scatters at the point it looks at by {} mm and {:.1e} rad (standard "
-      "deviation per axis), which gives ten visits an envelope of about 0.011 mm as the paper found at its "
-      "balls. "
-      "Truth: the size that was rendered. The last columns ask for two states, as the paper's total length "
-      "has.",
+      "views as the services do it. The robot scatters at the point it looks at by {} mm and {:.1e} rad "
+      "(standard deviation per axis), which gives ten visits an envelope of about 0.011 mm as the paper "
+      "found at its balls. Truth: the size that was rendered. The last columns ask for two states, as the "
+      "paper's total length has.",
       options.runs, config.part.position_scatter_mm, config.part.rotation_scatter_deg,
       config.robot.position_sd_mm, config.robot.rotation_sd_rad);
   report.tables.push_back(ValueTable(all));
