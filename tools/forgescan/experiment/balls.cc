@@ -158,9 +158,10 @@ std::string CalibrationRemark(CellConfig config, const std::vector<Visit>& visit
     within += std::abs(DistanceByCalibration(config) - kBallDistanceMm) <= kDistanceGoalMm ? 1 : 0;
   }
   return fmt::format(
-      "Of the distance's error {:+.4f} mm are the written calibration's (truth: its rays, without noise); of "
-      "{} calibrations of the cell's care {:.0f} % are within {} mm.",
-      own_mm, kStations, 100.0 * within / kStations, kDistanceGoalMm);
+      "Of the distance's error {:+.4f} mm are the written calibration's (truth: its rays, without noise), "
+      "the same at every scan; the rest is {:.4f} mm at most. Of {} calibrations of the cell's care {:.0f} % "
+      "are within {} mm.",
+      own_mm, rest_mm, kStations, 100.0 * within / kStations, kDistanceGoalMm);
 }
 
 Table VisitTable(const std::vector<Visit>& visits, double& worst_mm) {

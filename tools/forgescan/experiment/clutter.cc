@@ -10,6 +10,40 @@ namespace {
 constexpr std::array kShares = {0.0, 0.1, 0.22, 0.35, 0.42, 0.5};
 constexpr double kRightMm = 0.02;  // worst corner of the 1.9 m part
 
+class Curves {
+ public:
+  void Add(double share, const Tally& tally) {
+    const auto add = [&](Series& series, double value) {
+      series.x.push_back(100 * share);
+      series.y.push_back(value);
+    };
+    add(right_, 100.0 * tally.right / tally.runs);
+    add(refused_, 100.0 * tally.refused / tally.runs);
+    add(wrong_, 100.0 * tally.wrong / tally.runs);
+    add(median_, tally.median_mm);
+    add(worst_, tally.worst_mm);
+  }
+
+  std::string Svg() const {
+    const Chart starts{"How the starts ended",
+                       {"foreign points, % of the scan"},
+                       {"starts, %", false, 0.0, 105.0},
+                       {right_, refused_, wrong_}};
+    const Chart errors{"Error of the worst corner",
+                       {"foreign points, % of the scan"},
+                       {"error, mm", true, 5e-4, 0.05},
+                       {median_, worst_},
+                       {{0.01, "goal to 22 %"}, {0.02, "goal at 35 %"}}};
+    return SvgFile("clutter", 900, 400,
+                   DrawChart(starts, {0, 0, 450, 400}) + DrawChart(errors, {450, 0, 450, 400}));
+  }
+
+ private:
+  Series right_{"right", Mark::kLineDots, {}, {}, 2}, refused_{"refused", Mark::kLineDots, {}, {}, 3};
+  Series wrong_{"wrong by 1 mm", Mark::kDashed, {}, {}, 1};
+  Series median_{"median", Mark::kLineDots, {}, {}, 0}, worst_{"worst", Mark::kLineDots, {}, {}, 1};
+};
+
 std::vector<std::string> Row(double share, const Tally& tally) {
   return {fmt::format("{:.0f} %", 100 * share), fmt::format("{} of {}", tally.right, tally.runs),
           fmt::format("{}", tally.near),        fmt::format("{}", tally.wrong),
@@ -39,30 +73,17 @@ Result<ExperimentReport> RunClutter(const ExperimentOptions& options) {
       ScanRequest().points, options.runs, kRightMm);
   Table table{{"foreign points", "right", "below 1 mm", "wrong", "refused", "median error mm", "worst mm"},
               {}};
-  Series right{"ended right", Mark::kLineDots, {}, {}, 2};
-  Series refused{"refused", Mark::kLineDots, {}, {}, 3};
-  Series wrong{"accepted, but wrong by 1 mm or more", Mark::kLineDots, {}, {}, 1};
+  Curves curves;
   for (const double share : kShares) {
     ScanRequest request;
     request.foreign_share = share;
     const Tally tally = Count(RunOurs(axle, request, options), kRightMm);
     table.rows.push_back(Row(share, tally));
     AddGoals(share, tally, report.goals);
-    const auto add = [&](Series& series, int count) {
-      series.x.push_back(100 * share);
-      series.y.push_back(100.0 * count / tally.runs);
-    };
-    add(right, tally.right);
-    add(refused, tally.refused);
-    add(wrong, tally.wrong);
+    curves.Add(share, tally);
   }
   report.tables.push_back(std::move(table));
-  const Chart chart{"Registration by foreign points",
-                    {"foreign points, % of the scan"},
-                    {"starts, %", false, 0.0, 105.0},
-                    {right, refused, wrong},
-                    {}};
-  report.svg = SvgFile("clutter", 900, 400, DrawChart(chart, {0, 0, 900, 400}));
+  report.svg = curves.Svg();
   return report;
 }
 
