@@ -143,13 +143,10 @@ TEST(Found, AModelWithoutAreaNamesTheFile) {
 }
 
 TEST(Found, AFaceWithAnInfiniteRadiusIsNoModel) {
-  ModelBundle bundle;
-  bundle.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
-  bundle.triangles = {{0, 1, 2}};
-  bundle.sample_points = {{0.1F, 0.1F, 0}};
-  bundle.sample_normals = {{0, 0, 1}};
-  bundle.spacing_mm = 1;
-  bundle.faces.push_back({.name = "a", .triangle_count = 1});
+  const auto model =
+      ModelFromMesh({.vertices = {{0, 0, 0}, {9, 0, 0}, {0, 9, 0}}, .triangles = {{0, 1, 2}}}, 1);
+  ASSERT_TRUE(model.ok());
+  ModelBundle bundle = *model;
   ASSERT_TRUE(Check(bundle).ok());
   bundle.faces[0].radius_mm = std::numeric_limits<double>::infinity();
   EXPECT_FALSE(Check(bundle).ok());

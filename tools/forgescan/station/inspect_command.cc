@@ -26,6 +26,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::int64_t kReadyPatienceUs = 60'000'000;
+constexpr std::int64_t kPagePatienceUs =
+    10'000'000;  // the report service itself waits no longer than half of it
 
 struct InspectOptions {
   int parts = 1;
@@ -131,7 +133,16 @@ Result<fs::path> MakeRunFolder(const std::string& base) {
   return Fail(ErrorCode::kIo, "no new folder can be made in {}", base);
 }
 
-// Returns when the line has sorted every part.
+// What is not written by then, the report service writes when it is stopped.
+Status WaitForPages(StationRunner& runner, const Progress& progress) {
+  const std::int64_t until_us = runner.bus().NowUs() + kPagePatienceUs;
+  while (!PagesAreWritten(runner.station().results, progress.verdicts()) && runner.bus().NowUs() < until_us) {
+    RETURN_IF_ERROR(runner.RunFor(100'000));
+  }
+  return {};
+}
+
+// Returns when the line has sorted every part, and their pages are written.
 Status InspectParts(StationRunner& runner, ProcessGroup& cell, const InspectOptions& options,
                     const fs::path& run, const Progress& progress) {
   const Interrupt interrupt;
@@ -163,6 +174,7 @@ Status InspectParts(StationRunner& runner, ProcessGroup& cell, const InspectOpti
       return Fail(ErrorCode::kUnavailable, "{} {}", ended->service, ended->Text());
     }
   }
+  RETURN_IF_ERROR(WaitForPages(runner, progress));
   Print(fmt::format("\n{}\ninspection took {:.0f} s, {} restarts\n", runner.Table(140, false),
                     progress.Seconds(), runner.restarts()));
   return {};

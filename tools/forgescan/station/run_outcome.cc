@@ -2,6 +2,7 @@
 
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <string>
 
@@ -41,6 +42,12 @@ void ShowReport(const fs::path& run, const fs::path& folder, int part, Problems&
 }
 
 }  // namespace
+
+bool PagesAreWritten(const fs::path& results, const std::vector<fsmsg::verdict_t>& verdicts) {
+  return std::ranges::all_of(verdicts, [&results](const fsmsg::verdict_t& verdict) {
+    return fs::exists(results / verdict.report_folder / "report.html");
+  });
+}
 
 Status ShowOutcome(const fs::path& run, const fs::path& results,
                    const std::vector<fsmsg::verdict_t>& verdicts, int parts) {
