@@ -1,18 +1,21 @@
-// bench_table GOALS.toml RESULT.json...: one table of all benches, each implementation's time over ours, against the goals.
-// Exit code 1 if a goal is missed or a benchmark failed; a peer that was not built is named and misses nothing.
+// bench_table GOALS.toml RESULT.json...: one table of all benches, each implementation's time over ours,
+// against the goals. Exit code 1 if a goal is missed or a benchmark failed; a peer that was not built is
+// named and misses nothing.
+#include <fmt/format.h>
+#include <toml++/toml.h>
+
 #include <algorithm>
 #include <cstdio>
 #include <exception>
 #include <fstream>
+#include <iterator>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <regex>
 #include <stdexcept>
 #include <string>
-#include <toml++/toml.h>
 #include <vector>
-
-#include <fmt/format.h>
 
 namespace {
 
@@ -42,11 +45,12 @@ double Milliseconds(double time, const std::string& unit) {
 
 // What Google Benchmark writes beside an entry's own keys are the bench's counters.
 std::string Counters(const nlohmann::json& entry) {
-  static const std::vector<std::string> known = {
-      "name",        "family_index",   "per_family_instance_index", "run_name",       "run_type",
-      "repetitions", "threads",        "aggregate_name",            "aggregate_unit", "iterations",
-      "real_time",   "cpu_time",       "time_unit",                 "error_occurred", "error_message",
-      "label",       "repetition_index"};
+  static const std::vector<std::string> known = {"name",       "family_index",    "per_family_instance_index",
+                                                 "run_name",   "run_type",        "repetitions",
+                                                 "threads",    "aggregate_name",  "aggregate_unit",
+                                                 "iterations", "real_time",       "cpu_time",
+                                                 "time_unit",  "error_occurred",  "error_message",
+                                                 "label",      "repetition_index"};
   std::string text;
   for (const auto& [key, value] : entry.items()) {
     if (value.is_number() && std::find(known.begin(), known.end(), key) == known.end()) {
@@ -60,7 +64,8 @@ std::string Counters(const nlohmann::json& entry) {
 std::pair<std::string, std::string> Split(std::string name) {
   const std::string clock = "/real_time";
   if (name.ends_with(clock)) name.resize(name.size() - clock.size());
-  for (const char* setting : {"/iterations:", "/repeats:"}) name.resize(std::min(name.size(), name.find(setting)));
+  for (const char* setting : {"/iterations:", "/repeats:"})
+    name.resize(std::min(name.size(), name.find(setting)));
   const auto slash = name.find('/');
   if (slash == std::string::npos) throw std::runtime_error("benchmark " + name + " is not named STEP/WHO");
   return {name.substr(0, slash), name.substr(slash + 1)};
@@ -76,7 +81,10 @@ Row& RowOf(std::vector<Row>& rows, const std::string& who) {
 void Read(const std::string& path, Steps& steps) {
   std::ifstream stream(path);
   if (!stream) throw std::runtime_error(path + " cannot be read");
-  const nlohmann::json results = nlohmann::json::parse(stream);
+  const std::string text{std::istreambuf_iterator<char>(stream), {}};
+  // Google Benchmark writes the spread of a counter that is always 0 as NaN, which is no JSON.
+  const nlohmann::json results =
+      nlohmann::json::parse(std::regex_replace(text, std::regex("-?(NaN|Infinity)"), "null"));
   for (const auto& entry : results.at("benchmarks")) {
     const auto [step, who] = Split(entry.at("run_name"));
     Row& row = RowOf(steps[step], who);
@@ -119,21 +127,21 @@ std::string Verdict(const Goal& goal, double ratio) {
 
 bool PrintStep(const Steps& steps, const std::string& step, const std::vector<Goal>& goals) {
   const auto ours = Find(steps, step, "ours");
-  bool good = ours.has_value() && ours->error.empty();
-  if (!good) fmt::print("{:<14} has no result of ours to compare with\n", step);
+  const bool comparable = ours.has_value() && ours->error.empty();
+  bool good = true;
   for (const Row& row : steps.at(step)) {
     if (!row.error.empty()) {
       fmt::print("{:<14} {:<18} FAILED: {}\n", step, row.who, row.error);
       good = false;
       continue;
     }
-    const double ratio = good ? row.time_ms / ours->time_ms : 0;
+    const double ratio = comparable ? row.time_ms / ours->time_ms : 0;
     const auto goal = std::find_if(goals.begin(), goals.end(),
                                    [&](const Goal& g) { return g.step == step && g.peer == row.who; });
     const std::string verdict = goal != goals.end() ? Verdict(*goal, ratio) : "";
     good = good && (goal == goals.end() || ratio >= goal->ratio);
-    fmt::print("{:<14} {:<18} {:>11.3f} {:>6.1f} {:>9.2f}  {:<16} {}\n", step, row.who, row.time_ms, 100 * row.spread,
-               ratio, verdict, row.counters);
+    fmt::print("{:<14} {:<18} {:>11.3f} {:>6.1f} {:>9.2f}  {:<16} {}\n", step, row.who, row.time_ms,
+               100 * row.spread, ratio, verdict, row.counters);
   }
   return good;
 }
@@ -147,7 +155,8 @@ int Run(int argc, char** argv) {
   fmt::print("{:<14} {:<18} {:>11} {:>6} {:>9}\n", "step", "who", "median ms", "cv %", "of ours");
   for (const auto& [step, rows] : steps) good = PrintStep(steps, step, goals) && good;
   for (const Goal& goal : goals) {
-    if (!Find(steps, goal.step, goal.peer)) fmt::print("{:<14} {:<18} was not run or not built\n", goal.step, goal.peer);
+    if (!Find(steps, goal.step, goal.peer))
+      fmt::print("{:<14} {:<18} was not run or not built\n", goal.step, goal.peer);
   }
   return good ? 0 : 1;
 }
