@@ -42,15 +42,22 @@ struct Scatter {
   double form = 0, noise = 0;
 };
 
+// Where hardly more cells have enough points than the fit has unknowns, nothing tells form from noise: all
+// that is left of the points counts as both.
 Scatter ScatterOf(const std::map<Key, Cell>& cells, double unknowns) {
-  double points = 0, within = 0, used = 0;
+  double points = 0, within = 0, used = 0, all_points = 0, all_squares = 0;
   for (const auto& [key, cell] : cells) {
+    all_points += cell.count;
+    all_squares += cell.squares;
     if (cell.count < kFewInCell) continue;
     used += 1;
     points += cell.count;
     within += cell.squares - cell.sum * cell.sum / cell.count;
   }
-  if (used < 1) return {};
+  if (used <= unknowns) {
+    const double all = all_squares / std::max(1.0, all_points - unknowns);
+    return {all, all};
+  }
   const double noise = std::max(0.0, within / std::max(1.0, points - used));
   double between = 0;
   for (const auto& [key, cell] : cells) {
@@ -59,7 +66,7 @@ Scatter ScatterOf(const std::map<Key, Cell>& cells, double unknowns) {
     between += mean * mean - noise / cell.count;
   }
   // The fit itself took `unknowns` of what the cells could differ by.
-  return {std::max(0.0, between / std::max(1.0, used - unknowns)), noise};
+  return {std::max(0.0, between / (used - unknowns)), noise};
 }
 
 }  // namespace

@@ -12,7 +12,7 @@ namespace {
 using Arrays = SurfaceGridArrays;
 
 constexpr float kLeastVoxel_mm = 1e-3F, kMostVoxel_mm = 1e6F;
-constexpr std::uint32_t kMostBricks = 1U << 24;  // along an axis: voxels are then exact in single precision
+constexpr std::uint32_t kMostBricks = 1U << 22;  // along an axis: 2^24 voxels, exact in single precision
 
 Status CheckTriangle(std::uint32_t triangle, std::size_t triangles) {
   if (triangle < triangles) return {};

@@ -159,7 +159,7 @@ SurfaceGrid Own(Words words, const Layout& layout) {
 Result<SurfaceGrid> BuildSurfaceGrid(const TriangleIndex& surface, const Eigen::Vector3f& low,
                                      const Eigen::Vector3f& high, const SurfaceGrid::Size& size) {
   if (!(size.voxel_mm > 0 && size.margin_mm > 0 && std::isfinite(size.voxel_mm) &&
-        (high - low).allFinite())) {
+        std::isfinite(size.margin_mm) && (high - low).allFinite())) {
     return Fail(ErrorCode::kInvalidArgument,
                 "a grid with voxels of {} mm and a margin of {} mm, expected > 0", size.voxel_mm,
                 size.margin_mm);

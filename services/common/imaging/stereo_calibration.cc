@@ -10,6 +10,7 @@
 #include <iterator>
 #include <opencv2/core.hpp>
 #include <string>
+#include <string_view>
 #include <utility>
 
 namespace forgescan {
@@ -39,13 +40,23 @@ bool NestsLittle(const std::string& text) {
   return text.size() <= kMaxFileBytes && std::count(text.begin(), text.end(), '<') <= kMaxTags;
 }
 
+// How many lines begin so, white space before it left out, which OpenCV skips.
+long LinesWith(const std::string& text, std::string_view begin) {
+  long lines = 0;
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t word = std::min(text.find_first_not_of(" \t\r\n", at), text.size());
+    lines += text.compare(word, begin.size(), begin) == 0 ? 1 : 0;
+    at = text.find('\n', word);
+    at = at == std::string::npos ? text.size() : at + 1;
+  }
+  return lines;
+}
+
 // OpenCV's YAML parser may run for ever on a file with several documents or directives; it writes one of
 // each.
 bool IsOneDocument(const std::string& text) {
   if (!text.starts_with("%YAML")) return true;  // XML or JSON
-  const std::size_t start = text.find("---");
-  return std::count(text.begin(), text.end(), '%') == 1 &&
-         (start == std::string::npos || text.find("---", start + 3) == std::string::npos);
+  return LinesWith(text, "%") == 1 && LinesWith(text, "---") <= 1;
 }
 
 // OpenCV makes room for rows x cols numbers before it looks how many there are.

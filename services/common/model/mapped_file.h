@@ -9,8 +9,9 @@
 
 namespace forgescan {
 
-// Read-only; unmapped with the last owner. The file may be replaced by another meanwhile (rename), not cut
-// short.
+// Read-only; unmapped with the last owner. The file may be replaced by another meanwhile (mv, or a program of
+// ours, which all replace files whole); overwritten in place, it ends the process with SIGBUS or changes what
+// was checked.
 class MappedFile {
  public:
   // Errors: kNotFound for no file of that name, or one that cannot be read; kIo if it is not a plain file or

@@ -160,5 +160,28 @@ TEST_F(InfluenceTest, TheFormOfAFaceIsNotTakenForNoise) {
   EXPECT_GT(other.influence.form_mm, 2 * other.standard_uncertainty_mm);
 }
 
+// Fewer and fewer points: the influence of scatter and form never vanishes, however empty the cells are.
+TEST_F(InfluenceTest, FewPointsAreNotSurerThanMany) {
+  const auto many = evaluator_->Evaluate(*cloud_);
+  ASSERT_TRUE(many.ok());
+  for (const std::size_t step : {20, 40, 80}) {
+    PointCloud few;
+    for (std::size_t i = 0; i < cloud_->size(); i += step) {
+      few.points.push_back(cloud_->points[i]);
+      few.normals.push_back(cloud_->normals[i]);
+      few.view.push_back(cloud_->view[i]);
+    }
+    const auto results = evaluator_->Evaluate(few);
+    ASSERT_TRUE(results.ok());
+    for (std::size_t i = 0; i < results->size(); ++i) {
+      const DimensionResult& result = (*results)[i];
+      if (!result.measured_mm) continue;
+      EXPECT_GT(result.influence.noise_mm, 2 * (*many)[i].influence.noise_mm) << result.name << " " << step;
+      EXPECT_GT(result.influence.noise_mm, 0.8 * result.standard_uncertainty_mm)
+          << result.name << " " << step;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace forgescan

@@ -140,7 +140,8 @@ TEST(SurfaceGrid, RefusesWrongSizesAndWordsThatLeadNowhere) {
   const auto built = Build(Sheet(20), 4);
   ASSERT_TRUE(built.ok());
   const Eigen::Vector3f low(0, 0, 0), high(1, 1, 1);
-  for (const SurfaceGrid::Size& size : {SurfaceGrid::Size{0, 10}, {4, -1}, {std::nanf(""), 10}}) {
+  for (const SurfaceGrid::Size& size :
+       {SurfaceGrid::Size{0, 10}, {4, -1}, {std::nanf(""), 10}, {4, HUGE_VALF}}) {
     EXPECT_EQ(SurfaceGrid::Build(built->surface, low, high, size).error().code, ErrorCode::kInvalidArgument);
   }
   const SurfaceGridArrays& good = built->grid.arrays();
@@ -155,6 +156,13 @@ TEST(SurfaceGrid, RefusesWrongSizesAndWordsThatLeadNowhere) {
   bad.bricks[1] += 1;
   EXPECT_FALSE(Check(bad, built->surface.size()).ok());
   EXPECT_FALSE(Check(SurfaceGridArrays{}, 1).ok());
+  // More voxels than single precision tells apart: the last place would lie behind the last brick.
+  const std::vector<std::uint32_t> tops((std::size_t{1} << 22) + 1, 0);
+  bad = {};
+  bad.voxel_mm = 1;
+  bad.bricks = {(1U << 22) + 1, 1, 1};
+  bad.tops = tops;
+  EXPECT_FALSE(Check(bad, 1).ok());
 }
 
 }  // namespace

@@ -43,6 +43,11 @@ TEST(StereoCalibration, Starts) {
   EXPECT_FALSE(calibration->projector.has_value());
 }
 
+TEST(StereoCalibration, CommentsMayHoldAnyMarks) {
+  const auto calibration = Load(GoodFile() + "# ------- good to 5 %\n");
+  EXPECT_TRUE(calibration.ok()) << calibration.error().message;
+}
+
 TEST(StereoCalibration, EveryWrongEntryIsNamed) {
   const std::vector<std::array<std::string, 3>> cases = {
       {"Kr:", "Kx:", "Kr is missing"},
