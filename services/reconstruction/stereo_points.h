@@ -38,7 +38,8 @@ struct StereoPoints {
 // One point for every raw column of the left camera on every epipolar row: between two raw rows by linear
 // interpolation, along the row smoothed by parabolas over five pixels of one surface. Its partner is found
 // between two neighbours of the right row. No image is resampled. sigma_mm: along the view ray. Normals come
-// from the gradient of the disparity over (2 normal_radius_px + 1)^2 pixels, steps in depth left out.
+// from the gradient of the disparity over (2 normal_radius_px + 1)^2 pixels; points whose direct
+// neighbours show a step in depth are left out, a step farther off in the window tilts the normal.
 // keep_every_nth_point thins the cloud and nothing else. See docs/design.md, "Coordinate, and how sure" and
 // "Stereo". Frames: see StereoRig. recycled: an earlier result nobody needs any more; fresh memory costs as
 // much time as everything else. Errors: kInvalidArgument when the views are not of the rig's size;

@@ -61,7 +61,8 @@ class SurfaceGrid {
                                              float max_distance_mm) const;
 
   // However far: exact within band_mm; beyond, the nearest place of the triangle stored there, whose distance
-  // is too long by less than the width of a brick. Nothing only for a point that is not finite.
+  // is too long by less than the diagonal of a brick for a point inside the box, and by more outside. Nothing
+  // only for a point that is not finite.
   std::optional<TriangleIndex::Nearest> FindRoughly(const TriangleIndex& surface,
                                                     const Eigen::Vector3f& point) const;
 

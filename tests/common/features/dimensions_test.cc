@@ -14,30 +14,9 @@ using testing::MakeAxle;
 using testing::ScanOf;
 using testing::ScanOptions;
 
-constexpr const char* kFeatures = R"(
-part = "axle"
-reference_temperature_degc = 900.0
-[[dimension]]
-name = "total length"
-type = "length"
-faces = ["left_end_face", "right_end_face"]
-datum = ["left_cylinder", "right_cylinder"]
-lower_mm = 1887.4
-upper_mm = 1889.4
-[[dimension]]
-name = "left plate width"
-type = "width"
-faces = ["left_plate_front", "left_plate_back"]
-lower_mm = 178.4
-upper_mm = 179.4
-[[dimension]]
-name = "right diameter"
-type = "diameter"
-faces = ["right_cylinder"]
-lower_mm = 88.0
-upper_mm = 89.0
-expanded_uncertainty_mm = 0.1
-)";
+// The last one, the diameter, has an uncertainty of its own.
+const std::string kFeatures = testing::AxleFeatures({"total length", "left plate width", "right diameter"}) +
+                              "expanded_uncertainty_mm = 0.1\n";
 
 class DimensionsTest : public ::testing::Test {
  protected:

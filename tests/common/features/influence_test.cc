@@ -10,29 +10,7 @@
 namespace forgescan {
 namespace {
 
-constexpr const char* kFeatures = R"(
-part = "axle"
-reference_temperature_degc = 900.0
-[[dimension]]
-name = "total length"
-type = "length"
-faces = ["left_end_face", "right_end_face"]
-datum = ["left_cylinder", "right_cylinder"]
-lower_mm = 1887.4
-upper_mm = 1889.4
-[[dimension]]
-name = "left plate width"
-type = "width"
-faces = ["left_plate_front", "left_plate_back"]
-lower_mm = 178.4
-upper_mm = 179.4
-[[dimension]]
-name = "right diameter"
-type = "diameter"
-faces = ["right_cylinder"]
-lower_mm = 88.0
-upper_mm = 89.0
-)";
+const std::vector<std::string> kDimensions = {"total length", "left plate width", "right diameter"};
 
 using Move = std::function<Eigen::Vector3d(const Eigen::Vector3d&)>;
 
@@ -41,7 +19,7 @@ class InfluenceTest : public ::testing::Test {
   static void SetUpTestSuite() {
     auto model = testing::MakeAxle({}, 4);
     ASSERT_TRUE(model.ok());
-    const auto features = ParseFeatures(kFeatures, "features.toml");
+    const auto features = ParseFeatures(testing::AxleFeatures(kDimensions), "features.toml");
     ASSERT_TRUE(features.ok());
     auto bound = BindFeatures(*features, *model);
     ASSERT_TRUE(bound.ok());

@@ -19,6 +19,8 @@
 #include <XCAFApp_Application.hxx>
 #include <XCAFDoc_DocumentTool.hxx>
 #include <XCAFDoc_ShapeTool.hxx>
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <random>
 
@@ -114,6 +116,31 @@ Result<ModelBundle> MakeAxle(const AxleSize& size, double spacing_mm) {
   auto model = LoadModel(path, {spacing_mm, {}});
   std::filesystem::remove(path);
   return model;
+}
+
+std::string AxleFeatures(const std::vector<std::string>& names) {
+  struct Dimension {
+    const char *name, *type, *faces, *datum;
+    double lower_mm, upper_mm;
+  };
+  constexpr std::array<Dimension, 5> kDimensions = {{
+      {"total length", "length", R"("left_end_face", "right_end_face")",
+       "datum = [\"left_cylinder\", \"right_cylinder\"]\n", 1887.4, 1889.4},
+      {"left plate width", "width", R"("left_plate_front", "left_plate_back")", "", 178.4, 179.4},
+      {"right plate width", "width", R"("right_plate_front", "right_plate_back")", "", 176.9, 177.9},
+      {"left diameter", "diameter", R"("left_cylinder")", "", 89.2, 90.2},
+      {"right diameter", "diameter", R"("right_cylinder")", "", 88.0, 89.0},
+  }};
+  std::string text = "part = \"axle\"\nreference_temperature_degc = 900.0\n";
+  for (const std::string& name : names) {
+    const auto* d =
+        std::ranges::find_if(kDimensions, [&](const Dimension& known) { return name == known.name; });
+    if (d == kDimensions.end()) throw std::invalid_argument("the test axle has no " + name);
+    text += fmt::format(
+        "[[dimension]]\nname = \"{}\"\ntype = \"{}\"\nfaces = [{}]\n{}lower_mm = {}\nupper_mm = {}\n",
+        d->name, d->type, d->faces, d->datum, d->lower_mm, d->upper_mm);
+  }
+  return text;
 }
 
 PointCloud ScanOf(const ModelBundle& model, const ScanOptions& options) {

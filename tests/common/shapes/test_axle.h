@@ -5,6 +5,8 @@
 #include <Eigen/Geometry>
 #include <cstdint>
 #include <filesystem>
+#include <string>
+#include <vector>
 
 #include "services/common/geometry/point_cloud.h"
 #include "services/common/model/model_bundle.h"
@@ -27,6 +29,13 @@ Status WriteAxleStep(const AxleSize& size, const std::filesystem::path& path);
 
 // The axle as imported model, through a STEP file in the test's temporary folder.
 Result<ModelBundle> MakeAxle(const AxleSize& size, double spacing_mm);
+
+// The sizes of the plain axle that AxleFeatures() knows.
+inline const std::vector<std::string> kAxleDimensions = {
+    "total length", "left plate width", "right plate width", "left diameter", "right diameter"};
+
+// Text of a features.toml with these dimensions, in this order; limits 0.5 mm or 1 mm about the nominal size.
+std::string AxleFeatures(const std::vector<std::string>& names);
 
 struct ScanOptions {
   std::size_t points = 60'000;

@@ -13,42 +13,6 @@
 namespace forgescan::testing {
 namespace {
 
-constexpr const char* kFeatures = R"(
-part = "axle"
-reference_temperature_degc = 900.0
-[[dimension]]
-name = "total length"
-type = "length"
-faces = ["left_end_face", "right_end_face"]
-datum = ["left_cylinder", "right_cylinder"]
-lower_mm = 1887.4
-upper_mm = 1889.4
-[[dimension]]
-name = "left plate width"
-type = "width"
-faces = ["left_plate_front", "left_plate_back"]
-lower_mm = 178.4
-upper_mm = 179.4
-[[dimension]]
-name = "right plate width"
-type = "width"
-faces = ["right_plate_front", "right_plate_back"]
-lower_mm = 176.9
-upper_mm = 177.9
-[[dimension]]
-name = "left diameter"
-type = "diameter"
-faces = ["left_cylinder"]
-lower_mm = 89.2
-upper_mm = 90.2
-[[dimension]]
-name = "right diameter"
-type = "diameter"
-faces = ["right_cylinder"]
-lower_mm = 88.0
-upper_mm = 89.0
-)";
-
 // As the path of the virtual station: along the front from left to right, back along the rear.
 struct View {
   Eigen::Vector3d target, towards;
@@ -162,7 +126,7 @@ class Simulation {
  public:
   static Result<Simulation> Build(const CoverageOptions& options) {
     ASSIGN_OR_RETURN(ModelBundle model, MakeAxle({}, 3));
-    ASSIGN_OR_RETURN(const Features features, ParseFeatures(kFeatures, "features.toml"));
+    ASSIGN_OR_RETURN(const Features features, ParseFeatures(AxleFeatures(kAxleDimensions), "features.toml"));
     ASSIGN_OR_RETURN(Features bound, BindFeatures(features, model));
     std::vector<SurfacePoint> seen = Sample(model, options.surface_points, options.seed);
     std::vector<SurfacePoint> even = Sample(model, options.surface_points, options.seed + 1);

@@ -45,7 +45,7 @@ std::vector<cv::Mat> Render(const VirtualCell& cell, const GeometryMap& map, con
   return ExposeAll(map, cell.config(), cell.Patterns(ProjectedSet::kReduced), key, threads);
 }
 
-// As the service publishes them.
+// As many as the service publishes, though not the same ones: it begins each row at another point.
 PointCloud EveryNth(const PointCloud& cloud, int n, int view) {
   PointCloud thin;
   for (std::size_t i = 0; i < cloud.size(); i += static_cast<std::size_t>(n)) {
