@@ -140,6 +140,7 @@ TEST_F(TwoStations, HearNothingOfEachOther) {
   EXPECT_EQ(json["robot"]["state"], "ERROR");
   EXPECT_EQ(json["report"]["restarts"], 0);
   EXPECT_GT(json["report"]["memory_mb"].get<double>(), 1.0);
+  EXPECT_GE(json["report"]["peak_memory_mb"].get<double>(), json["report"]["memory_mb"].get<double>());
   Down();
 }
 

@@ -12,6 +12,7 @@ namespace forgescan {
 struct Usage {
   std::optional<double> cpu_percent;  // of one core, since the call before; nothing at the first one
   double memory_mb = 0;               // resident, 10^6 bytes
+  double peak_memory_mb = 0;          // the most that was ever resident
 };
 
 class ProcessUsage {

@@ -47,6 +47,7 @@ std::string StateTable::Json(const std::vector<TableRow>& rows) const {
     service["restarts"] = OrNull(row.restarts);
     service["cpu_percent"] = OrNull(row.usage ? row.usage->cpu_percent : std::nullopt);
     service["memory_mb"] = OrNull(row.usage ? std::optional(row.usage->memory_mb) : std::nullopt);
+    service["peak_memory_mb"] = OrNull(row.usage ? std::optional(row.usage->peak_memory_mb) : std::nullopt);
     const auto found = states_.find(row.service);
     if (found == states_.end()) {
       service["state"] = nullptr;

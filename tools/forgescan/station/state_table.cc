@@ -126,11 +126,13 @@ std::string StateTable::Line(const TableRow& row, std::size_t rest, bool colour)
                                        : LookOf(*state, Silent(*state));
   const auto cpu = row.usage ? row.usage->cpu_percent : std::nullopt;
   const auto memory = row.usage ? std::optional(row.usage->memory_mb) : std::nullopt;
+  const auto peak = row.usage ? std::optional(row.usage->peak_memory_mb) : std::nullopt;
   const Rates rates = RatesOf(row.service);
-  std::string line = fmt::format(
-      "{:<15}{} {:>5} {:>5} {:>5} {:>6} {:>6}", row.service, Painted(look, colour),
-      state ? fmt::format("{:.1f}", static_cast<double>(AgeUs(*state)) * 1e-6) : "-", Shown(cpu, "{:.0f}"),
-      Shown(memory, "{:.0f}"), Shown(rates.in_per_s, "{:.1f}"), Shown(rates.out_per_s, "{:.1f}"));
+  std::string line =
+      fmt::format("{:<15}{} {:>5} {:>5} {:>5} {:>5} {:>5} {:>5}", row.service, Painted(look, colour),
+                  state ? fmt::format("{:.1f}", static_cast<double>(AgeUs(*state)) * 1e-6) : "-",
+                  Shown(cpu, "{:.0f}"), Shown(memory, "{:.0f}"), Shown(peak, "{:.0f}"),
+                  Shown(rates.in_per_s, "{:.1f}"), Shown(rates.out_per_s, "{:.1f}"));
   if (state == nullptr) {
     line += fmt::format(" {:>5} {:>6} {:>6} {:>5}", "-", "-", "-", Shown(row.restarts, "{}"));
     return line + "\n";
@@ -141,9 +143,9 @@ std::string StateTable::Line(const TableRow& row, std::size_t rest, bool colour)
 }
 
 std::string StateTable::Render(const std::vector<TableRow>& rows, int width, bool colour) const {
-  const std::string head =
-      fmt::format("{:<15}{:<9} {:>5} {:>5} {:>5} {:>6} {:>6} {:>5} {:>6} {:>6} {:>5}  ", "service", "state",
-                  "age s", "cpu %", "MB", "in/s", "out/s", "gaps", "resent", "recov.", "rest.");
+  const std::string head = fmt::format(
+      "{:<15}{:<9} {:>5} {:>5} {:>5} {:>5} {:>5} {:>5} {:>5} {:>6} {:>6} {:>5}  ", "service", "state",
+      "age s", "cpu %", "MB", "peak", "in/s", "out/s", "gaps", "resent", "recov.", "rest.");
   const auto columns = static_cast<std::size_t>(std::max(kLeastWidth, width));
   const std::size_t rest = columns > head.size() ? columns - head.size() : 0;
   std::string table = Cut(head + "doing", columns) + "\n", errors;

@@ -79,14 +79,15 @@ TEST_F(StateTableTest, ShowsStateRatesCountsAndCost) {
   word.counters = {{"messages_received", 13}, {"messages_sent", 180}};
   Say(word);
   TableRow row = Row("camera_left");
-  row.usage = Usage{12.4, 345.6};
+  row.usage = Usage{12.4, 345.6, 401.2};
   row.restarts = 2;
   EXPECT_THAT(LineOf("camera_left", {row}),
               ::testing::MatchesRegex(
-                  "camera_left +working +0\\.0 +12 +346 +1\\.5 +40\\.0 +3 +14 +15 +2  part 3 view 4"));
+                  "camera_left +working +0\\.0 +12 +346 +401 +1\\.5 +40\\.0 +3 +14 +15 +2  part 3 view 4"));
   const auto json = nlohmann::json::parse(table_.Json({row}))["camera_left"];
   EXPECT_EQ(json["state"], "WORKING");
   EXPECT_EQ(json["out_per_s"], 40.0);
+  EXPECT_EQ(json["peak_memory_mb"], 401.2);
   EXPECT_EQ(json["restarts"], 2);
   EXPECT_EQ(json["counters"]["messages_sent"], 180);
 }
@@ -141,9 +142,15 @@ TEST(ProcessUsage, KnowsOneselfAndNotTheDead) {
   ASSERT_TRUE(first.has_value());
   EXPECT_FALSE(first->cpu_percent.has_value());
   EXPECT_GT(first->memory_mb, 1.0);
+  EXPECT_GE(first->peak_memory_mb, first->memory_mb);
+  {
+    const std::vector<char> large(64 << 20, 'x');  // resident for a moment
+    EXPECT_GT(usage.Of(getpid(), 0)->memory_mb, first->memory_mb + 50.0) << large.back();
+  }
   const auto second = usage.Of(getpid(), kSecondUs);
   ASSERT_TRUE(second.has_value() && second->cpu_percent.has_value());
   EXPECT_GE(*second->cpu_percent, 0.0);
+  EXPECT_GT(second->peak_memory_mb, second->memory_mb + 50.0) << "the moment is over, the peak stays";
   EXPECT_FALSE(usage.Of(0, kSecondUs).has_value());
   EXPECT_FALSE(usage.Of(-1, kSecondUs).has_value());
 }
