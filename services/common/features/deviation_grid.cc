@@ -91,15 +91,24 @@ class DeviationSurface::GridBuilder {
     for (int i = 0; i < 3; ++i) cell.middle[i] = middle[i];
     std::copy(axes.data(), axes.data() + 9, cell.axes);
     cell.first = static_cast<std::uint32_t>(grid_.nodes.size());
-    for (std::size_t begin = 0; begin < near_.size(); begin += kWidth) {
+    boxes_.clear();
+    for (const std::int32_t leaf : near_) {
+      const Eigen::AlignedBox3f box = BoxOf(leaf, middle, axes);
+      boxes_.push_back({box.exteriorDistance(Eigen::Vector3f(0, 0, 0)), leaf, box});
+    }
+    std::sort(boxes_.begin(), boxes_.end(), [](const NearLeaf& a, const NearLeaf& b) {
+      return std::pair(a.distance_mm, a.leaf) < std::pair(b.distance_mm, b.leaf);
+    });
+    for (std::size_t begin = 0; begin < boxes_.size(); begin += kWidth) {
       Node node;
       for (std::size_t lane = 0; lane < kWidth; ++lane) {
-        const bool is_there = begin + lane < near_.size();
-        const std::int32_t leaf = near_[is_there ? begin + lane : 0];
-        node.child[lane] = ~leaf;
-        PlaceBox(is_there ? BoxOf(leaf, middle, axes) : kNowhere, lane, node);
+        const bool is_there = begin + lane < boxes_.size();
+        const NearLeaf& near = boxes_[is_there ? begin + lane : 0];
+        node.child[lane] = ~near.leaf;
+        PlaceBox(is_there ? near.box : kNowhere, lane, node);
       }
       grid_.nodes.push_back(node);
+      grid_.nearest_mm.push_back(std::max(boxes_[begin].distance_mm - kBoxRounding_mm, 0.0F));
     }
     cell.last = static_cast<std::uint32_t>(grid_.nodes.size());
     grid_.cell_at.back() = static_cast<std::int32_t>(grid_.cells.size());
@@ -168,10 +177,17 @@ class DeviationSurface::GridBuilder {
     }
   }
 
+  struct NearLeaf {
+    float distance_mm;  // of its box from the middle of the cell
+    std::int32_t leaf;
+    Eigen::AlignedBox3f box;
+  };
+
   const DeviationSurface& surface_;
   Grid grid_;
   float cell_mm_ = 1;
   std::vector<std::int32_t> near_;
+  std::vector<NearLeaf> boxes_;
 };
 
 DeviationSurface::Grid DeviationSurface::MakeGrid() const { return GridBuilder(*this).Build(); }

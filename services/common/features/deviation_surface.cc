@@ -9,6 +9,7 @@
 #include <limits>
 
 #include "services/common/parallel_blocks.h"
+#include "services/common/simd_target.h"
 
 // Compiled with -ffp-contract=off: a fused product would differ between the paths.
 
@@ -58,6 +59,12 @@ FORGESCAN_INLINE unsigned Bits(Mask mask) {
   return static_cast<unsigned>(low) | static_cast<unsigned>(high) << 4;
 }
 
+FORGESCAN_INLINE float LeastOf(Lanes x) {
+  x = Least(x, __builtin_shufflevector(x, x, 4, 5, 6, 7, 0, 1, 2, 3));
+  x = Least(x, __builtin_shufflevector(x, x, 2, 3, 0, 1, 6, 7, 4, 5));
+  return x[0] < x[1] ? x[0] : x[1];
+}
+
 FORGESCAN_INLINE float WithTies(float squared) { return squared + (squared * kTieShare + kTie_mm2); }
 
 }  // namespace
@@ -94,18 +101,20 @@ struct DeviationQuery {
         Least(Least(FromSide(arm, ab, Load(leaf.inverse_ab)), FromSide(arm, ac, Load(leaf.inverse_ac))),
               FromSide(arm - ab, ac - ab, Load(leaf.inverse_bc)));
     const Lanes squared = inside ? height * height : side;
-    alignas(32) float squares[8], heights[8];
-    *reinterpret_cast<Lanes*>(squares) = squared;
+    const float least = LeastOf(squared);
+    if (!(least <= WithTies(best.squared))) return;
+    // Of those that are equally near, the one that the point is highest over.
+    if (best.squared > WithTies(least)) best.leaf = -1;
+    best.squared = least < best.squared ? least : best.squared;
+    alignas(32) float heights[8];
     *reinterpret_cast<Lanes*>(heights) = height;
     for (unsigned bits = Bits(squared <= WithTies(best.squared)); bits != 0; bits &= bits - 1) {
       const int lane = __builtin_ctz(bits);
-      if (!(squares[lane] <= WithTies(best.squared))) continue;
-      const bool is_tie = best.leaf >= 0 && WithTies(squares[lane]) >= best.squared;
-      if (is_tie && std::abs(heights[lane]) <= std::abs(best.height)) {
-        best.squared = squares[lane] < best.squared ? squares[lane] : best.squared;
-        continue;
+      if (best.leaf < 0 || std::abs(heights[lane]) > std::abs(best.height)) {
+        best.height = heights[lane];
+        best.leaf = number;
+        best.lane = lane;
       }
-      best = {squares[lane] < best.squared ? squares[lane] : best.squared, heights[lane], number, lane};
     }
   }
 
@@ -148,8 +157,10 @@ struct DeviationQuery {
       return Lanes{} + ((axis[0] * x + axis[1] * y) + axis[2] * z);
     };
     const Point local{along(cell.axes), along(cell.axes + 3), along(cell.axes + 6)};
+    // Nothing nearer than `bound` lies farther from the middle than this.
+    const float reach_mm = __builtin_sqrtf(bound) + __builtin_sqrtf((x * x + y * y) + z * z);
     std::size_t depth = 0;
-    for (std::uint32_t i = cell.first; i < cell.last; ++i) {
+    for (std::uint32_t i = cell.first; i < cell.last && grid.nearest_mm[i] <= reach_mm; ++i) {
       depth = Open(grid.nodes[i], local, bound, stack, depth, 0);
     }
     return depth;
@@ -199,7 +210,7 @@ struct DeviationQuery {
     }
   }
 
-  [[gnu::target("avx2")]] void RunAvx2() const { Run(); }
+  FORGESCAN_TARGET_AVX2 void RunAvx2() const { Run(); }
 };
 
 float DeviationQuery::PreciseDeviation(const Leaf& leaf, int lane, const Eigen::Vector3f& point) {

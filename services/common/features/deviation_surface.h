@@ -49,7 +49,7 @@ class DeviationSurface {
     std::int32_t child[kWidth];  // >= 0: node; < 0: leaf, its complement
   };
   // What can be nearest to a point of one cell of a grid: leaves, eight a node, as boxes in a frame that lies
-  // along the surface there, so that they are flat.
+  // along the surface there, so that they are flat. The nearest to the cell's middle come first.
   struct Cell {
     float middle[3], axes[9];   // the frame: row by row, from the middle of the cell
     std::uint32_t first, last;  // of the nodes
@@ -61,6 +61,7 @@ class DeviationSurface {
     std::vector<std::int32_t> cell_at;  // by place, x first; -1: ask the tree
     std::vector<Cell> cells;
     std::vector<Node> nodes;
+    std::vector<float> nearest_mm;  // entry i: from the middle to the nearest box of node i
   };
   struct Range {
     std::size_t begin, end;
