@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "services/common/simd_target.h"
+
 // Compiled with -ffp-contract=off: a fused product would differ between the paths.
 
 namespace forgescan {
@@ -222,11 +224,11 @@ struct ResidualJob {
 };
 
 template <typename Job>
-[[gnu::target("avx512f,avx512dq,prefer-vector-width=512")]] void RunAvx512(const Job& job) {
+FORGESCAN_TARGET_AVX512 void RunAvx512(const Job& job) {
   job.Run();
 }
 template <typename Job>
-[[gnu::target("avx2")]] void RunAvx2(const Job& job) {
+FORGESCAN_TARGET_AVX2 void RunAvx2(const Job& job) {
   job.Run();
 }
 
