@@ -27,17 +27,21 @@ double Threshold(const std::vector<NearestSample>& nearest, double sigmas) {
   return mean + sigmas * std::sqrt(std::max(squares / count - mean * mean, 0.0));
 }
 
-// Steps 4 and 5: numbers of the pairs that are kept, nearest first.
+// Steps 4 and 5: numbers of the pairs that are kept, in the order of the scan.
 std::vector<std::size_t> Keep(const std::vector<NearestSample>& nearest, const PaperIcpOptions& options) {
   const double threshold_mm = Threshold(nearest, options.threshold_sigmas);
   std::vector<std::size_t> kept;
+  kept.reserve(nearest.size());
   for (std::size_t i = 0; i < nearest.size(); ++i) {
     if (nearest[i].distance_mm <= threshold_mm) kept.push_back(i);
   }
-  std::sort(kept.begin(), kept.end(), [&](std::size_t i, std::size_t j) {
-    return std::tie(nearest[i].distance_mm, i) < std::tie(nearest[j].distance_mm, j);
-  });
-  kept.resize(static_cast<std::size_t>(options.keep_share * static_cast<double>(kept.size())));
+  const auto count = static_cast<std::size_t>(options.keep_share * static_cast<double>(kept.size()));
+  std::nth_element(kept.begin(), kept.begin() + static_cast<std::ptrdiff_t>(count), kept.end(),
+                   [&](std::size_t i, std::size_t j) {
+                     return std::tie(nearest[i].distance_mm, i) < std::tie(nearest[j].distance_mm, j);
+                   });
+  kept.resize(count);
+  std::sort(kept.begin(), kept.end());
   return kept;
 }
 
@@ -84,8 +88,10 @@ Result<PaperRegistration> RegisterAsInPaper(const PointCloud& scan, const Regist
   int still = 0;
   for (; result.iterations < options.max_iterations && still < kStillSteps; ++result.iterations) {
     std::vector<Eigen::Vector3f> points;
-    for (const auto& p : scan.points)
+    points.reserve(scan.points.size());
+    for (const auto& p : scan.points) {
       points.emplace_back((result.model_from_scan * p.cast<double>()).cast<float>());
+    }
     const std::vector<NearestSample> nearest = search(points);
     ASSIGN_OR_RETURN(const Row step, Solve(points, nearest, Keep(nearest, options), model));
     Eigen::Isometry3d motion(Rotation(step.head<3>()));
