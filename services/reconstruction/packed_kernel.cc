@@ -54,9 +54,20 @@ void LookUp(const std::uint8_t* cells, const U16* cell, std::uint8_t* order, int
   }
 }
 
+// The functions between them are compiled for these instructions; GCC wants to be told the width as well.
+#define FORGESCAN_PRAGMA(text) _Pragma(#text)
+#if defined(__clang__)
+#define FORGESCAN_BEGIN_TARGET(target_, width_) \
+  FORGESCAN_PRAGMA(clang attribute push(__attribute__((target(target_))), apply_to = function))
+#define FORGESCAN_END_TARGET FORGESCAN_PRAGMA(clang attribute pop)
+#else
+#define FORGESCAN_BEGIN_TARGET(target_, width_) \
+  FORGESCAN_PRAGMA(GCC push_options) FORGESCAN_PRAGMA(GCC target(target_ "," width_))
+#define FORGESCAN_END_TARGET FORGESCAN_PRAGMA(GCC pop_options)
+#endif
+
 #if defined(__x86_64__)
-#pragma GCC push_options
-#pragma GCC target("avx2,prefer-vector-width=256")
+FORGESCAN_BEGIN_TARGET("avx2", "prefer-vector-width=256")
 namespace avx2 {
 constexpr int kBytes = 32;
 #define FORGESCAN_HIGH(a, b) (V) _mm256_mulhi_epu16((__m256i)(a), (__m256i)(b))
@@ -73,10 +84,9 @@ constexpr int kBytes = 32;
 #undef FORGESCAN_WIDEN
 #undef FORGESCAN_GATHER
 }  // namespace avx2
-#pragma GCC pop_options
+FORGESCAN_END_TARGET
 
-#pragma GCC push_options
-#pragma GCC target("avx512f,avx512bw,avx512vl,avx512dq,prefer-vector-width=512")
+FORGESCAN_BEGIN_TARGET("avx512f,avx512bw,avx512vl,avx512dq", "prefer-vector-width=512")
 namespace avx512 {
 constexpr int kBytes = 64;
 #define FORGESCAN_HIGH(a, b) (V) _mm512_mulhi_epu16((__m512i)(a), (__m512i)(b))
@@ -92,7 +102,7 @@ constexpr int kBytes = 64;
 #undef FORGESCAN_WIDEN
 #undef FORGESCAN_GATHER
 }  // namespace avx512
-#pragma GCC pop_options
+FORGESCAN_END_TARGET
 #endif
 
 namespace baseline {
