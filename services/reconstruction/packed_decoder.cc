@@ -151,8 +151,8 @@ std::optional<PackedDecoder> PackedDecoder::Make(const Set& set, SimdPath path) 
 void PackedDecoder::SetOrders(const Set& set) {
   const FringeOrderTable& table = set.table;
   const auto slot_of = [&](int frequency) {
-    return static_cast<int>(std::ranges::find(frequency_, static_cast<std::size_t>(frequency)) -
-                            frequency_.begin());
+    return static_cast<std::size_t>(std::ranges::find(frequency_, static_cast<std::size_t>(frequency)) -
+                                    frequency_.begin());
   };
   constants_.slot = {slot_of(table.base), slot_of(table.others[0]), slot_of(table.others[1])};
   constants_.first_slot = slot_of(0);
@@ -204,8 +204,8 @@ void PackedDecoder::SetMasks(const Set& set) {
   for (std::size_t slot = 0; slot < 3; ++slot) {
     const double ratio = RatioToFirst(set.pattern, frequency_[slot]);
     constants_.mean_ratio[slot] = Steps(1 / (3 * ratio), kTurn);
-    if (static_cast<int>(slot) != constants_.first_slot) {
-      constants_.compared_slot[other] = static_cast<int>(slot);
+    if (slot != constants_.first_slot) {
+      constants_.compared_slot[other] = slot;
       constants_.ratio_least[other] = Steps(ratio * (1 - config.modulation_ratio_tolerance), 32768);
       constants_.ratio_most[other] = Steps(ratio * (1 + config.modulation_ratio_tolerance), 32768);
       ++other;

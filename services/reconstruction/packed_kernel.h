@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 
 #include "services/common/simd_path.h"
@@ -20,8 +21,8 @@ struct PackedLimit {
 // modulation or contrast 1/64 DN. A phase is within 1.5e-4 rad of the exact one, a hundredth of the noise of
 // good light; a modulation within 1/5000 and 1/32 DN.
 struct PackedConstants {
-  std::array<int, 3> slot{};  // of the finest frequency and of the other two
-  int first_slot = 0;         // of the pattern's first frequency, which ratios and reference refer to
+  std::array<std::size_t, 3> slot{};  // of the finest frequency and of the other two
+  std::size_t first_slot = 0;         // of the pattern's first frequency, which ratios and reference refer to
   bool has_reference = false;
 
   // 256 x 256 in squares of 8 x 8: fringe order less the first one; bit 7: doubtful. The index has, from its
@@ -49,7 +50,7 @@ struct PackedConstants {
   std::uint16_t noise_limit = 0;               // of the least modulation scaled by quietness, squared, >> 12
   std::uint16_t ratio_limit = 0;               // of the excess of a ratio, squared, >> 8
   std::array<std::uint16_t, 2> quietness{};    // 2^-16: least phase noise over that of slot 0, of the others
-  std::array<int, 2> compared_slot{};          // those that are not first_slot
+  std::array<std::size_t, 2> compared_slot{};  // those that are not first_slot
   std::array<std::uint16_t, 2> ratio_least{};  // 2^-15: modulation over the first slot's
   std::array<std::uint16_t, 2> ratio_most{};   // 2^-15
 
