@@ -2,6 +2,8 @@
 #pragma once
 
 #include <array>
+#include <bit>
+#include <cmath>
 #include <cstdint>
 #include <opencv2/core/mat.hpp>
 #include <optional>
@@ -31,11 +33,21 @@ constexpr std::string_view NameOf(MaskCause cause) {
   return kNames[static_cast<std::size_t>(cause)];
 }
 
+// A float by its upper 16 bits, sign, exponent and 7 bits: to 0.4 %, rounded.
+inline float FloatFromUpper(std::uint16_t upper) {
+  return std::bit_cast<float>(static_cast<std::uint32_t>(upper) << 16);
+}
+inline std::uint16_t UpperOfFloat(float value) {
+  return static_cast<std::uint16_t>((std::bit_cast<std::uint32_t>(value) + 0x8000U) >> 16);
+}
+
 // Shape: every map has the size of the frames. Frames: raw camera pixels.
 struct DecodedView {
-  cv::Mat_<float> coordinate_px;  // projector column; the estimate even where masked, so always look at cause
-  cv::Mat_<float> sigma_px;       // its predicted standard deviation, projector px
-  cv::Mat_<std::uint8_t> cause;   // MaskCause
+  // Projector column; where masked an estimate, or NaN for want of contrast, so always look at cause.
+  cv::Mat_<float> coordinate_px;
+  cv::Mat_<std::uint16_t> variance_px2;  // its predicted variance, projector px^2, by FloatFromUpper
+  cv::Mat_<std::uint8_t> cause;          // MaskCause
+  float SigmaPx(int row, int column) const { return std::sqrt(FloatFromUpper(variance_px2(row, column))); }
   std::array<long, kMaskCauses> count{};  // pixels by cause; their sum is the image
   long repaired = 0;  // valid pixels whose fringe order was doubtful and came from their neighbours
   std::optional<double> clipping_dn;  // where the camera cut off grey values, if below saturation_fraction

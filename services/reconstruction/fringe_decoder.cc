@@ -29,7 +29,8 @@ bool DecodeRow(std::span<const cv::Mat> frames, int row, StripDecoder& strip, De
     strip.Load(frames, row, column, length);
     strip.Decode();
     std::copy_n(strip.coordinate_px.begin(), length, view.coordinate_px[row] + column);
-    std::copy_n(strip.sigma_px.begin(), length, view.sigma_px[row] + column);
+    std::transform(strip.sigma_px.begin(), strip.sigma_px.begin() + length, view.variance_px2[row] + column,
+                   [](float sigma_px) { return UpperOfFloat(sigma_px * sigma_px); });
     std::transform(strip.cause.begin(), strip.cause.begin() + length, view.cause[row] + column,
                    [](std::int32_t cause) { return static_cast<std::uint8_t>(cause); });
     doubts = std::find(strip.cause.begin(), strip.cause.begin() + length, kDoubtful) !=
@@ -49,7 +50,7 @@ void TakeMedians(std::span<const cv::Mat> frames, const FringeDecoder& decoder, 
     for (int column = step / 2; column < view.cause.cols; column += step) {
       if (view.cause(row, column) == static_cast<std::uint8_t>(MaskCause::kValid)) {
         modulation.Add(sampler.LeastModulation(row, column));
-        sigma.Add(static_cast<double>(view.sigma_px(row, column)));
+        sigma.Add(static_cast<double>(view.SigmaPx(row, column)));
       }
     }
   }

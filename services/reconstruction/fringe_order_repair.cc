@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <optional>
 #include <vector>
 
@@ -13,20 +14,33 @@ namespace {
 constexpr auto kValid = static_cast<std::uint8_t>(MaskCause::kValid);
 constexpr int kRadiusPx = 2;
 
+const std::uint8_t* FindByte(const std::uint8_t* begin, const std::uint8_t* end, std::uint8_t byte) {
+  const void* const found = std::memchr(begin, byte, static_cast<std::size_t>(end - begin));
+  return found == nullptr ? end : static_cast<const std::uint8_t*>(found);
+}
+
 struct Repair {
   int row;
   int column;
   float coordinate_px;
+  std::uint16_t variance_px2;
 };
 
-std::optional<float> MedianOfNeighbours(const DecodedView& view, int row, int column, int min_neighbours) {
+struct Neighbours {
+  float median_px;
+  std::uint16_t variance_px2;  // largest
+};
+
+std::optional<Neighbours> ValidNeighbours(const DecodedView& view, int row, int column, int min_neighbours) {
   std::array<float, 25> values;
+  std::uint16_t variance_px2 = 0;  // halves of positive floats are in the order of the floats
   int count = 0;
   for (int y = std::max(row - kRadiusPx, 0); y <= std::min(row + kRadiusPx, view.cause.rows - 1); ++y) {
     for (int x = std::max(column - kRadiusPx, 0); x <= std::min(column + kRadiusPx, view.cause.cols - 1);
          ++x) {
       if (view.cause(y, x) == kValid) {
         values[static_cast<std::size_t>(count++)] = view.coordinate_px(y, x);
+        variance_px2 = std::max(variance_px2, view.variance_px2(y, x));
       }
     }
   }
@@ -34,7 +48,7 @@ std::optional<float> MedianOfNeighbours(const DecodedView& view, int row, int co
     return std::nullopt;
   }
   std::nth_element(values.begin(), values.begin() + count / 2, values.begin() + count);
-  return values[static_cast<std::size_t>(count / 2)];
+  return Neighbours{values[static_cast<std::size_t>(count / 2)], variance_px2};
 }
 
 // Repairs of one row, decided on the view as it is.
@@ -50,18 +64,18 @@ class RowRepair {
     constexpr auto kDoubtful = static_cast<std::uint8_t>(MaskCause::kUnwrapMargin);
     std::vector<Repair> repairs;
     const std::uint8_t* const cause = view_.cause[row];
-    for (int column = 0; column < view_.cause.cols; ++column) {
-      if (cause[column] != kDoubtful) {
-        continue;
-      }
-      const auto median = MedianOfNeighbours(view_, row, column, min_neighbours_);
-      if (!median) {
+    const std::uint8_t* const end = cause + view_.cause.cols;
+    for (const std::uint8_t* at = cause; (at = FindByte(at, end, kDoubtful)) != end; ++at) {
+      const int column = static_cast<int>(at - cause);
+      const auto neighbours = ValidNeighbours(view_, row, column, min_neighbours_);
+      if (!neighbours) {
         continue;
       }
       const float coordinate = view_.coordinate_px(row, column);
-      const float moved = coordinate - period_px_ * std::round((coordinate - *median) / period_px_);
-      if (std::abs(moved - *median) <= tolerance_px_) {
-        repairs.push_back({row, column, moved});
+      const float moved =
+          coordinate - period_px_ * std::round((coordinate - neighbours->median_px) / period_px_);
+      if (std::abs(moved - neighbours->median_px) <= tolerance_px_) {
+        repairs.push_back({row, column, moved, neighbours->variance_px2});
       }
     }
     return repairs;
@@ -91,6 +105,7 @@ long RepairFringeOrders(const std::vector<std::uint8_t>& doubtful_rows, double p
   for (const auto& row : rows) {
     for (const Repair& one : row) {
       view.coordinate_px(one.row, one.column) = one.coordinate_px;
+      view.variance_px2(one.row, one.column) = one.variance_px2;
       view.cause(one.row, one.column) = kValid;
       ++count;
     }

@@ -11,9 +11,10 @@ namespace forgescan {
 
 // A pixel masked by kUnwrapMargin moves by whole periods to where the median of its valid neighbours (5 x 5)
 // is; it becomes valid if there are enough of them and it then comes near to it. Neighbours are taken as they
-// were before any repair, so the order of visits does not matter. doubtful_rows: whether a row has such
-// pixels. period_px: of the finest frequency. Returns the number of pixels made valid. See docs/design.md,
-// "Fringe order" and "Masks and refusals".
+// were before any repair, so the order of visits does not matter. Its variance, predicted for another order,
+// becomes the largest of theirs. doubtful_rows: whether a row has such pixels. period_px: of the finest
+// frequency. Returns the number of pixels made valid. See docs/design.md, "Fringe order" and "Masks and
+// refusals".
 long RepairFringeOrders(const std::vector<std::uint8_t>& doubtful_rows, double period_px,
                         const ReconstructionConfig& config, DecodedView& view);
 

@@ -16,72 +16,83 @@ constexpr auto kBorder = static_cast<std::uint8_t>(MaskCause::kBorder);
 constexpr int kBlockRows = 64;
 using Counts = std::array<long, kMaskCauses>;
 
-// Widens the masks of a block of rows, from a copy of the rows around it as they were before.
+// Widens the masks of a block of rows. A row is marked only when all that look at it as it was are done.
 class BlockBorder {
  public:
   BlockBorder(int radius_px, int width_px, SimdPath path)
       : kernel_(path),
         radius_(radius_px),
         width_(static_cast<std::size_t>(width_px)),
-        padded_(width_ + 2 * static_cast<std::size_t>(radius_px)),
-        ring_(2 * static_cast<std::size_t>(radius_px) + 1, std::vector<std::uint8_t>(width_)),
-        near_(width_) {}
+        joined_(width_ + 2 * static_cast<std::size_t>(radius_px)),
+        near_(static_cast<std::size_t>(radius_px) + 1, std::vector<std::uint8_t>(width_)) {}
 
   // before: the rows as they were; a row beyond the image is nullptr. rows: [begin, end).
   void Run(const std::function<const std::uint8_t*(int)>& before, int begin, int end,
            cv::Mat_<std::uint8_t>& cause) {
-    for (int row = begin - radius_; row < begin + radius_; ++row) {
-      WidenRow(before(row), row);
-    }
-    for (int row = begin; row < end; ++row) {
-      WidenRow(before(row + radius_), row + radius_);
-      Mark(cause[row]);
+    for (int row = begin; row < end + radius_; ++row) {
+      if (row < end) {
+        FindNear(before, row);
+      }
+      if (row - radius_ >= begin) {
+        kernel_.Mark(Near(row - radius_), kBorder, {cause[row - radius_], width_});
+      }
     }
   }
 
  private:
-  std::vector<std::uint8_t>& Slot(int row) {
-    const int slots = 2 * radius_ + 1;
-    return ring_[static_cast<std::size_t>((row + slots) % slots)];
-  }
+  std::vector<std::uint8_t>& Near(int row) { return near_[static_cast<std::size_t>(row % (radius_ + 1))]; }
 
-  void WidenRow(const std::uint8_t* cause, int row) {
-    std::vector<std::uint8_t>& wide = Slot(row);
-    if (cause == nullptr) {
-      std::fill(wide.begin(), wide.end(), std::uint8_t{0});
-      return;
+  // Where the row has a masked pixel within the radius.
+  void FindNear(const std::function<const std::uint8_t*(int)>& before, int row) {
+    rows_.clear();
+    for (int y = row - radius_; y <= row + radius_; ++y) {
+      if (const std::uint8_t* const other = before(y)) {
+        rows_.push_back(other);
+      }
     }
-    std::copy_n(cause, width_, padded_.begin() + radius_);
-    kernel_.Widen(padded_, 2 * radius_, wide);
-  }
-
-  void Mark(std::uint8_t* cause) {
-    near_ = ring_[0];
-    for (std::size_t slot = 1; slot < ring_.size(); ++slot) {
-      kernel_.Join(ring_[slot], near_);
-    }
-    kernel_.Mark(near_, kBorder, {cause, width_});
+    kernel_.Join(rows_, std::span(joined_).subspan(static_cast<std::size_t>(radius_), width_));
+    kernel_.Widen(joined_, 2 * radius_, Near(row));
   }
 
   MaskKernel kernel_;
   int radius_;
   std::size_t width_;
-  std::vector<std::uint8_t> padded_;
-  std::vector<std::vector<std::uint8_t>> ring_;
-  std::vector<std::uint8_t> near_;
+  std::vector<const std::uint8_t*> rows_;
+  std::vector<std::uint8_t> joined_;  // 0 on both sides
+  std::vector<std::vector<std::uint8_t>> near_;
 };
 
-// Causes come in long runs: eight at a time where they are equal.
-void CountRow(const std::uint8_t* cause, int width, Counts& counts) {
-  int x = 0;
-  for (; x + 8 <= width; x += 8) {
-    std::uint64_t eight = 0;
-    std::memcpy(&eight, cause + x, 8);
-    if (eight == std::rotl(eight, 8)) {
-      counts[cause[x]] += 8;
-    } else {
-      std::for_each_n(cause + x, 8, [&](std::uint8_t one) { ++counts[one]; });
+// Whether all bytes are equal.
+template <int length>
+bool IsUniform(const std::uint8_t* bytes) {
+  std::uint64_t words[length / 8];
+  std::memcpy(words, bytes, length);
+  std::uint64_t differ = words[0] ^ std::rotl(words[0], 8);
+  for (const std::uint64_t word : words) {
+    differ |= word ^ words[0];
+  }
+  return differ == 0;
+}
+
+template <int length>
+void CountBytes(const std::uint8_t* cause, Counts& counts) {
+  if (IsUniform<length>(cause)) {
+    counts[cause[0]] += length;
+  } else if constexpr (length == 8) {
+    std::for_each_n(cause, length, [&](std::uint8_t one) { ++counts[one]; });
+  } else {
+    for (int x = 0; x < length; x += 8) {
+      CountBytes<8>(cause + x, counts);
     }
+  }
+}
+
+// Causes come in long runs.
+void CountRow(const std::uint8_t* cause, int width, Counts& counts) {
+  constexpr int kRun = 64;
+  int x = 0;
+  for (; x + kRun <= width; x += kRun) {
+    CountBytes<kRun>(cause + x, counts);
   }
   for (; x < width; ++x) {
     ++counts[cause[x]];

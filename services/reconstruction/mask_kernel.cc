@@ -1,5 +1,6 @@
 #include "services/reconstruction/mask_kernel.h"
 
+#include <algorithm>
 #include <cstddef>
 
 namespace forgescan {
@@ -7,6 +8,7 @@ namespace {
 
 using In = std::span<const std::uint8_t>;
 using Out = std::span<std::uint8_t>;
+using Rows = std::span<const std::uint8_t* const>;
 
 [[gnu::always_inline]] inline void JoinBytes(const std::uint8_t* from, std::uint8_t* __restrict to,
                                              std::size_t length) {
@@ -15,11 +17,28 @@ using Out = std::span<std::uint8_t>;
   }
 }
 
+[[gnu::always_inline]] inline void JoinRows(Rows rows, Out out) {
+  const std::size_t length = out.size();
+  std::uint8_t* const __restrict to = out.data();
+  if (rows.size() == 5) {  // two px each side: the usual border, in one go
+    const std::uint8_t *const a = rows[0], *const b = rows[1], *const c = rows[2], *const d = rows[3],
+                              *const e = rows[4];
+    for (std::size_t x = 0; x < length; ++x) {
+      to[x] = static_cast<std::uint8_t>(a[x] | b[x] | c[x] | d[x] | e[x]);
+    }
+    return;
+  }
+  std::copy_n(rows[0], length, to);
+  for (const std::uint8_t* const row : rows.subspan(1)) {
+    JoinBytes(row, to, length);
+  }
+}
+
 [[gnu::always_inline]] inline void WidenBytes(In in, int reach, Out out) {
   const std::size_t length = out.size();
   const std::uint8_t* const from = in.data();
   std::uint8_t* const __restrict to = out.data();
-  if (reach == 4) {  // two px each side: the usual border, in one go
+  if (reach == 4) {
     for (std::size_t x = 0; x < length; ++x) {
       to[x] = static_cast<std::uint8_t>(from[x] | from[x + 1] | from[x + 2] | from[x + 3] | from[x + 4]);
     }
@@ -44,17 +63,22 @@ using Out = std::span<std::uint8_t>;
 }
 
 void WidenPlain(In in, int reach, Out out) { WidenBytes(in, reach, out); }
-void JoinPlain(In from, Out to) { JoinBytes(from.data(), to.data(), to.size()); }
+void JoinPlain(Rows rows, Out to) { JoinRows(rows, to); }
 void MarkPlain(In near, std::uint8_t border, Out cause) { MarkBytes(near, border, cause); }
 
 #if defined(__x86_64__)
+#if defined(__clang__)  // has no such preference
+#define FORGESCAN_AVX2 [[gnu::target("avx2")]]
+#define FORGESCAN_AVX512 [[gnu::target("avx512f,avx512bw,avx512vl,avx512dq")]]
+#else
 #define FORGESCAN_AVX2 [[gnu::target("avx2,prefer-vector-width=256")]]
 #define FORGESCAN_AVX512 [[gnu::target("avx512f,avx512bw,avx512vl,avx512dq,prefer-vector-width=512")]]
+#endif
 FORGESCAN_AVX2 void WidenAvx2(In in, int reach, Out out) { WidenBytes(in, reach, out); }
-FORGESCAN_AVX2 void JoinAvx2(In from, Out to) { JoinBytes(from.data(), to.data(), to.size()); }
+FORGESCAN_AVX2 void JoinAvx2(Rows rows, Out to) { JoinRows(rows, to); }
 FORGESCAN_AVX2 void MarkAvx2(In near, std::uint8_t border, Out cause) { MarkBytes(near, border, cause); }
 FORGESCAN_AVX512 void WidenAvx512(In in, int reach, Out out) { WidenBytes(in, reach, out); }
-FORGESCAN_AVX512 void JoinAvx512(In from, Out to) { JoinBytes(from.data(), to.data(), to.size()); }
+FORGESCAN_AVX512 void JoinAvx512(Rows rows, Out to) { JoinRows(rows, to); }
 FORGESCAN_AVX512 void MarkAvx512(In near, std::uint8_t border, Out cause) { MarkBytes(near, border, cause); }
 #endif
 

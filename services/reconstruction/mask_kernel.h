@@ -16,8 +16,8 @@ class MaskKernel {
   void Widen(std::span<const std::uint8_t> in, int reach, std::span<std::uint8_t> out) const {
     widen_(in, reach, out);
   }
-  // to[x] |= from[x], of equal length.
-  void Join(std::span<const std::uint8_t> from, std::span<std::uint8_t> to) const { join_(from, to); }
+  // to[x] = the bits of all rows, at least one, joined by or.
+  void Join(std::span<const std::uint8_t* const> rows, std::span<std::uint8_t> to) const { join_(rows, to); }
   // cause[x] becomes border where it is 0 and near[x] is not.
   void Mark(std::span<const std::uint8_t> near, std::uint8_t border, std::span<std::uint8_t> cause) const {
     mark_(near, border, cause);
@@ -25,7 +25,7 @@ class MaskKernel {
 
  private:
   void (*widen_)(std::span<const std::uint8_t>, int, std::span<std::uint8_t>);
-  void (*join_)(std::span<const std::uint8_t>, std::span<std::uint8_t>);
+  void (*join_)(std::span<const std::uint8_t* const>, std::span<std::uint8_t>);
   void (*mark_)(std::span<const std::uint8_t>, std::uint8_t, std::span<std::uint8_t>);
 };
 

@@ -40,13 +40,14 @@ class PackedDecoder {
   void SetOrders(const Set& set);
   void SetMasks(const Set& set);
   void SetReference(const Set& set);
-  void SetSigma(const Set& set);
+  void SetVariance(const Set& set);
 
   PackedKernel kernel_;
   PackedConstants constants_;
   std::array<std::size_t, 3> frequency_{};  // of each slot
   std::array<std::size_t, 8> frame_{};      // of each frame of PackedStrip
-  std::vector<std::uint32_t> cells_;
+  std::vector<std::uint8_t> cells_;
+  std::vector<std::uint32_t> factors_;
 };
 
 }  // namespace forgescan

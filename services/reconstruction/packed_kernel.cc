@@ -3,6 +3,10 @@
 // (-ffp-contract=off), give equal bits on each.
 #include "services/reconstruction/packed_kernel.h"
 
+#include <algorithm>
+#include <bit>
+#include <utility>
+
 #if defined(__x86_64__)
 #include <immintrin.h>
 #endif
@@ -24,62 +28,107 @@ constexpr int kLanes = PackedKernel::kMaxLength;
 template <typename T>
 using Lane = std::array<T, kLanes>;
 
-// All of a strip's arrays: 35 kB, so that they stay in the first-level cache.
+constexpr int kBlock = PackedKernel::kBlock;
+static_assert(PackedKernel::kMaxLength / kBlock <= 32, "FindLit has a bit for each block");
+
+// All of a strip's arrays: 12 kB, so that they stay in the first-level cache.
 struct alignas(64) Work {
-  Lane<U16> level;                    // 2 A, DN
-  std::array<Lane<I16>, 3> c;         // 2 C, DN
-  std::array<Lane<I16>, 3> s;         // 2 S
-  std::array<Lane<U16>, 3> most;      // greater of |c| and |s|, at least 1
-  std::array<Lane<U16>, 3> slope;     // lesser over greater, 2^-16
-  std::array<Lane<I16>, 3> is_steep;  // -1 where |s| is the greater one
+  Lane<U16> level;  // 2 A, DN
   std::array<Lane<U16>, 3> phase;
   std::array<Lane<U16>, 3> modulation;
-  Lane<U16> order;
-  Lane<U16> outside;  // of the projector's field
-  std::array<Lane<U16>, 2>
-      code;         // the others' phases less their share of the finest one; then what they disagree by
-  Lane<U16> white;  // expected, 1/64 DN
-  Lane<U16> white_off;
-  Lane<U16> excess;       // of the modulations' ratios, 1/64 DN
-  Lane<U16> least;        // modulation
-  Lane<U16> quiet;        // least modulation, scaled by the slots' noise
-  Lane<U16> squares;      // of the frames' influence on the coordinate, 2^-16
-  Lane<U16> lit_squares;  // the same times grey value over 256
-  Lane<std::uint8_t> peak;
+  std::array<Lane<U16>, 2> code;  // the others' phases less their share of the finest one
+  Lane<U16> cell;
+  Lane<U16> peak;  // greatest of the frames, DN
+  Lane<std::uint8_t> order;
 };
 
+// One by one: a processor loads two entries a cycle, its instruction that collects them is not faster, and
+// what a compiler makes of it is slower.
+#if defined(__GNUC__) && !defined(__clang__)
+[[gnu::optimize("no-tree-vectorize")]]
+#endif
+void LookUp(const std::uint8_t* cells, const U16* cell, std::uint8_t* order, int length) {
+#pragma GCC unroll 8
+  for (int x = 0; x < length; ++x) {
+    order[x] = cells[cell[x]];
+  }
+}
+
+// The functions between them are compiled for these instructions; GCC wants to be told the width as well.
+#define FORGESCAN_PRAGMA(text) _Pragma(#text)
+#if defined(__clang__)
+#define FORGESCAN_BEGIN_TARGET(target_, width_) \
+  FORGESCAN_PRAGMA(clang attribute push(__attribute__((target(target_))), apply_to = function))
+#define FORGESCAN_END_TARGET FORGESCAN_PRAGMA(clang attribute pop)
+#else
+#define FORGESCAN_BEGIN_TARGET(target_, width_) \
+  FORGESCAN_PRAGMA(GCC push_options) FORGESCAN_PRAGMA(GCC target(target_ "," width_))
+#define FORGESCAN_END_TARGET FORGESCAN_PRAGMA(GCC pop_options)
+#endif
+
 #if defined(__x86_64__)
-#pragma GCC push_options
-#pragma GCC target("avx2,prefer-vector-width=256")
+FORGESCAN_BEGIN_TARGET("avx2", "prefer-vector-width=256")
 namespace avx2 {
 constexpr int kBytes = 32;
 #define FORGESCAN_HIGH(a, b) (V) _mm256_mulhi_epu16((__m256i)(a), (__m256i)(b))
+#define FORGESCAN_EXCESS(a, b) (V) _mm256_subs_epu16((__m256i)(a), (__m256i)(b))
+#define FORGESCAN_PAIR_SUMS(a, b) (Wide) _mm256_madd_epi16((__m256i)(a), (__m256i)(b))
+#define FORGESCAN_WIDEN(bytes) \
+  (V) _mm256_cvtepu8_epi16(_mm_loadu_si128(reinterpret_cast<const __m128i*>(bytes)))
+#define FORGESCAN_GATHER(table, index) \
+  (Wide) _mm256_i32gather_epi32(reinterpret_cast<const int*>(table), (__m256i)(index), 4)
 #include "services/reconstruction/packed_kernel_loops.inc"
 #undef FORGESCAN_HIGH
+#undef FORGESCAN_EXCESS
+#undef FORGESCAN_PAIR_SUMS
+#undef FORGESCAN_WIDEN
+#undef FORGESCAN_GATHER
 }  // namespace avx2
-#pragma GCC pop_options
+FORGESCAN_END_TARGET
 
-#pragma GCC push_options
-#pragma GCC target("avx512f,avx512bw,avx512vl,avx512dq,prefer-vector-width=512")
+FORGESCAN_BEGIN_TARGET("avx512f,avx512bw,avx512vl,avx512dq", "prefer-vector-width=512")
 namespace avx512 {
 constexpr int kBytes = 64;
 #define FORGESCAN_HIGH(a, b) (V) _mm512_mulhi_epu16((__m512i)(a), (__m512i)(b))
+#define FORGESCAN_EXCESS(a, b) (V) _mm512_subs_epu16((__m512i)(a), (__m512i)(b))
+#define FORGESCAN_PAIR_SUMS(a, b) (Wide) _mm512_madd_epi16((__m512i)(a), (__m512i)(b))
+#define FORGESCAN_WIDEN(bytes) \
+  (V) _mm512_cvtepu8_epi16(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(bytes)))
+#define FORGESCAN_GATHER(table, index) (Wide) _mm512_i32gather_epi32((__m512i)(index), table, 4)
 #include "services/reconstruction/packed_kernel_loops.inc"
 #undef FORGESCAN_HIGH
+#undef FORGESCAN_EXCESS
+#undef FORGESCAN_PAIR_SUMS
+#undef FORGESCAN_WIDEN
+#undef FORGESCAN_GATHER
 }  // namespace avx512
-#pragma GCC pop_options
+FORGESCAN_END_TARGET
 #endif
 
 namespace baseline {
 constexpr int kBytes = 16;
+#define FORGESCAN_WIDEN(bytes) __builtin_convertvector(*reinterpret_cast<const Bytes*>(bytes), V)
+#define FORGESCAN_GATHER(table, index) \
+  Wide { (I32) table[index[0]], (I32)table[index[1]], (I32)table[index[2]], (I32)table[index[3]] }
 #if defined(__x86_64__)
 #define FORGESCAN_HIGH(a, b) (V) _mm_mulhi_epu16((__m128i)(a), (__m128i)(b))
+#define FORGESCAN_EXCESS(a, b) (V) _mm_subs_epu16((__m128i)(a), (__m128i)(b))
+#define FORGESCAN_PAIR_SUMS(a, b) (Wide) _mm_madd_epi16((__m128i)(a), (__m128i)(b))
 #else
-using Wide [[gnu::vector_size(32)]] = std::uint32_t;
+using Products [[gnu::vector_size(32)]] = U32;
 #define FORGESCAN_HIGH(a, b) \
-  __builtin_convertvector((__builtin_convertvector(a, Wide) * __builtin_convertvector(b, Wide)) >> 16, V)
+  __builtin_convertvector(   \
+      (__builtin_convertvector(a, Products) * __builtin_convertvector(b, Products)) >> 16, V)
+#define FORGESCAN_EXCESS(a, b) (Greater(a, b) - (b))
+#define FORGESCAN_PAIR_SUMS(a, b) \
+  ((Wide)(a) << 16 >> 16) * ((Wide)(b) << 16 >> 16) + ((Wide)(a) >> 16) * ((Wide)(b) >> 16)
 #endif
 #include "services/reconstruction/packed_kernel_loops.inc"
+#undef FORGESCAN_HIGH
+#undef FORGESCAN_EXCESS
+#undef FORGESCAN_PAIR_SUMS
+#undef FORGESCAN_WIDEN
+#undef FORGESCAN_GATHER
 }  // namespace baseline
 
 }  // namespace

@@ -52,7 +52,7 @@ Status CheckSlopes(double left, double right) {
 
 Status CheckSize(const DecodedView& view, const StereoRig& rig) {
   const cv::Size size(rig.size().width_px, rig.size().height_px);
-  if (view.cause.size() != size || view.coordinate_px.size() != size || view.sigma_px.size() != size) {
+  if (view.cause.size() != size || view.coordinate_px.size() != size || view.variance_px2.size() != size) {
     return Fail(ErrorCode::kInvalidArgument, "the views have {} x {} px, prepared were {} x {}",
                 view.cause.cols, view.cause.rows, size.width, size.height);
   }
@@ -61,10 +61,10 @@ Status CheckSize(const DecodedView& view, const StereoRig& rig) {
 
 RawView ViewOf(const DecodedView& view, double slope, const ReconstructionConfig& config) {
   return {.coordinate_px = view.coordinate_px[0],
-          .sigma_px = view.sigma_px[0],
+          .variance_px2 = view.variance_px2[0],
           .cause = view.cause[0],
           .coordinate_stride = static_cast<std::ptrdiff_t>(view.coordinate_px.step1()),
-          .sigma_stride = static_cast<std::ptrdiff_t>(view.sigma_px.step1()),
+          .variance_stride = static_cast<std::ptrdiff_t>(view.variance_px2.step1()),
           .cause_stride = static_cast<std::ptrdiff_t>(view.cause.step1()),
           .width = view.cause.cols,
           .height = view.cause.rows,

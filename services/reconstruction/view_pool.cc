@@ -12,7 +12,7 @@ bool IsOurs(const cv::Mat& map) { return map.u != nullptr && map.u->refcount == 
 void ViewPool::Give(DecodedView view) {
   constexpr std::size_t kMaxViews = 2;
   const std::lock_guard lock(mutex_);
-  if (views_.size() < kMaxViews && IsOurs(view.coordinate_px) && IsOurs(view.sigma_px) &&
+  if (views_.size() < kMaxViews && IsOurs(view.coordinate_px) && IsOurs(view.variance_px2) &&
       IsOurs(view.cause)) {
     views_.push_back(std::move(view));
   }
@@ -24,13 +24,13 @@ DecodedView ViewPool::Take(cv::Size size) {
     const std::lock_guard lock(mutex_);
     if (!views_.empty()) {
       view.coordinate_px = std::move(views_.back().coordinate_px);
-      view.sigma_px = std::move(views_.back().sigma_px);
+      view.variance_px2 = std::move(views_.back().variance_px2);
       view.cause = std::move(views_.back().cause);
       views_.pop_back();
     }
   }
   view.coordinate_px.create(size);
-  view.sigma_px.create(size);
+  view.variance_px2.create(size);
   view.cause.create(size);
   return view;
 }

@@ -25,9 +25,9 @@ struct EpipolarBlock {
 // Raw images; strides in elements.
 struct RawView {
   const float* coordinate_px;
-  const float* sigma_px;
-  const std::uint8_t* cause;  // 0: valid
-  std::ptrdiff_t coordinate_stride, sigma_stride, cause_stride;
+  const std::uint16_t* variance_px2;  // upper halves of floats
+  const std::uint8_t* cause;          // 0: valid
+  std::ptrdiff_t coordinate_stride, variance_stride, cause_stride;
   int width, height;
   float max_step_px;  // largest difference of two neighbours on one surface
   float sign;         // makes coordinates ascend along a row

@@ -21,6 +21,12 @@ FORGESCAN_INLINE Floats Load(const float* at) {
   __builtin_memcpy(&value, at, sizeof(value));
   return value;
 }
+// Floats of which only the upper halves are stored.
+FORGESCAN_INLINE Floats LoadUpper(const std::uint16_t* at) {
+  std::uint16_t __attribute__((vector_size(32))) upper;
+  __builtin_memcpy(&upper, at, sizeof(upper));
+  return (Floats)(__builtin_convertvector(upper, Ints) << 16);
+}
 FORGESCAN_INLINE void Store(float* at, Floats value) { __builtin_memcpy(at, &value, sizeof(value)); }
 FORGESCAN_INLINE Floats All(float value) { return Floats{} + value; }
 FORGESCAN_INLINE Floats LaneNumbers() { return Floats{0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15}; }

@@ -9,33 +9,34 @@ namespace {
 
 // Two neighbouring raw rows at 16 columns.
 struct RawBlock {
-  const float *upper, *lower, *sigma;
+  const float *upper, *lower;
+  const std::uint16_t* variance;
   const std::uint8_t *upper_cause, *lower_cause;
 };
 
 // The last columns of an image whose width is no multiple of 16, where a whole block must not be read.
 struct RawEdge {
-  float values[3][kLanes];
+  float values[2][kLanes];
+  std::uint16_t variances[kLanes];
   std::uint8_t causes[2][kLanes];
 
   RawBlock Copy(const RawBlock& from, int length) {
-    const float* const sources[3] = {from.upper, from.lower, from.sigma};
     for (int i = 0; i < kLanes; ++i) {
-      for (int j = 0; j < 3; ++j) {
-        values[j][i] = i < length ? sources[j][i] : 0;
-      }
+      values[0][i] = i < length ? from.upper[i] : 0;
+      values[1][i] = i < length ? from.lower[i] : 0;
+      variances[i] = i < length ? from.variance[i] : 0;
       causes[0][i] = i < length ? from.upper_cause[i] : 1;
       causes[1][i] = i < length ? from.lower_cause[i] : 1;
     }
-    return {values[0], values[1], values[2], causes[0], causes[1]};
+    return {values[0], values[1], variances, causes[0], causes[1]};
   }
 };
 
 FORGESCAN_INLINE RawBlock BlockAt(const RawView& view, int row, int column) {
   const float* const coordinate = view.coordinate_px + row * view.coordinate_stride + column;
   const std::uint8_t* const cause = view.cause + row * view.cause_stride + column;
-  return {coordinate, coordinate + view.coordinate_stride, view.sigma_px + row * view.sigma_stride + column,
-          cause, cause + view.cause_stride};
+  return {coordinate, coordinate + view.coordinate_stride,
+          view.variance_px2 + row * view.variance_stride + column, cause, cause + view.cause_stride};
 }
 
 // Asks for what the lines a few rows below will read here first: memory hands out pieces of many rows too
@@ -45,7 +46,7 @@ FORGESCAN_INLINE void FetchAhead(const RawView& view, int row, int column) {
   const int later = row + kRowsAhead < view.height ? row + kRowsAhead : view.height - 1;
   const RawBlock block = BlockAt(view, later, column);
   __builtin_prefetch(block.upper, 0, 2);
-  __builtin_prefetch(block.sigma, 0, 2);
+  __builtin_prefetch(block.variance, 0, 2);
   __builtin_prefetch(block.upper_cause, 0, 2);
 }
 
@@ -61,9 +62,8 @@ FORGESCAN_INLINE void AddRow(const RawBlock& raw, Mask here, Floats part, const 
   const Mask inside = here & LessEqual(Floats{}, part);  // a line above the image truncates to its first row
   const Mask valid =
       inside & BothZero(raw.upper_cause, raw.lower_cause) & LessEqual(Magnitude(step), All(view.max_step_px));
-  // Two independent values of one sigma: fringes run across the rows, so both rows have nearly the same.
-  const Floats sigma = Load(raw.sigma);
-  const Floats variance = sigma * sigma * (1 - 2 * part * (1 - part));
+  // Two independent values of one variance: fringes run across the rows, so both rows have nearly the same.
+  const Floats variance = LoadUpper(raw.variance) * (1 - 2 * part * (1 - part));
   sampled.coordinate_px = Select(valid, view.sign * (upper + part * step), sampled.coordinate_px);
   sampled.variance_px2 = Select(valid, variance, sampled.variance_px2);
 }

@@ -60,7 +60,8 @@ DecodedView SeeDecoded(const DecodedScene& scene, const CameraIntrinsics& lens, 
   DecodedView view;
   view.coordinate_px.create(size.height_px, size.width_px);
   view.cause.create(size.height_px, size.width_px);
-  view.sigma_px = cv::Mat_<float>(size.height_px, size.width_px, static_cast<float>(scene.noise_px));
+  view.variance_px2 = cv::Mat_<std::uint16_t>(
+      size.height_px, size.width_px, UpperOfFloat(static_cast<float>(scene.noise_px * scene.noise_px)));
   std::mt19937 random(seed);
   std::normal_distribution<double> noise(0, 1);
   const Eigen::Vector3d origin = -pose.rotation.transpose() * pose.translation_mm;

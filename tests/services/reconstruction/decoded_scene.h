@@ -17,7 +17,7 @@ struct DecodedScene {
     return false;
   };
   double projector_width_px = 0;
-  double noise_px = 0;  // normal, of each coordinate; what sigma_px says of it
+  double noise_px = 0;  // normal, of each coordinate; what variance_px2 says of it
 };
 
 // What a camera sees of it. pose: of the camera. Masked: shadows of the projector and holes, with a border of

@@ -44,7 +44,7 @@ bool AreSameBytes(const cv::Mat& a, const cv::Mat& b) {
 
 void ExpectSame(const DecodedView& a, const DecodedView& b) {
   EXPECT_TRUE(AreSameBytes(a.coordinate_px, b.coordinate_px));
-  EXPECT_TRUE(AreSameBytes(a.sigma_px, b.sigma_px));
+  EXPECT_TRUE(AreSameBytes(a.variance_px2, b.variance_px2));
   EXPECT_TRUE(AreSameBytes(a.cause, b.cause));
   EXPECT_EQ(a.count, b.count);
   EXPECT_EQ(a.repaired, b.repaired);
@@ -67,7 +67,7 @@ TEST(FringeDecoder, StartsOnTheStationsScene) {
       ASSERT_FALSE(is_kept && !is_lit) << row << " " << column;
       if (is_kept) {  // 7 sigma: one in 10^11 pixels beyond
         ASSERT_NEAR(view.coordinate_px(row, column), scene.columns(row, column),
-                    7 * view.sigma_px(row, column));
+                    7 * view.SigmaPx(row, column));
       }
     }
   }
@@ -95,7 +95,7 @@ TEST(FringeDecoder, PackedArithmeticIsThePlainOneButForRounding) {
         ASSERT_LT(std::abs(off_px), 0.002);
         squares += off_px * off_px;
         // The packed one takes the mean of the three modulations, which differ by noise.
-        ASSERT_NEAR(a.sigma_px(row, column) / b.sigma_px(row, column), 1, 0.15);
+        ASSERT_NEAR(a.SigmaPx(row, column) / b.SigmaPx(row, column), 1, 0.15);
       }
     }
   }
@@ -149,6 +149,60 @@ Columns Sweep(cv::Size size) {
   cv::RNG random(7);
   random.fill(columns, cv::RNG::UNIFORM, 100.0, 1800.0);
   return columns;
+}
+
+// Whole blocks without contrast are not decoded; what they get instead is the same on every path.
+TEST(FringeDecoder, WithoutContrastThereIsNoCoordinate) {
+  ReconstructionConfig config;
+  config.mask_border_px = 0;
+  const PatternSet pattern = StationPattern(Background::kShared);
+  const StationScene scene = RenderStation({613, 301}, pattern, config.noise);
+  std::vector<cv::Mat> frames = scene.frames;
+  for (cv::Mat& frame : frames) {
+    frame(cv::Rect(0, 0, 20, 301)) = 250;
+  }
+  const DecodedView view = Decode(Decoder(pattern, config), frames);
+  long without = 0;
+  for (int row = 0; row < view.cause.rows; ++row) {
+    for (int column = 0; column < view.cause.cols; ++column) {
+      const auto cause = static_cast<MaskCause>(view.cause(row, column));
+      const bool is_nan = std::isnan(view.coordinate_px(row, column));
+      ASSERT_EQ(is_nan, std::isnan(view.SigmaPx(row, column)));
+      if (is_nan) {
+        ++without;
+        ASSERT_EQ(cause, column < 20 ? MaskCause::kSaturated : MaskCause::kLowModulation)
+            << row << " " << column;
+      }
+      if (column < 20) {
+        ASSERT_EQ(cause, MaskCause::kSaturated) << row << " " << column;
+      } else if (std::isnan(scene.columns(row, column))) {
+        ASSERT_EQ(cause, MaskCause::kLowModulation) << row << " " << column;
+      }
+    }
+  }
+  EXPECT_GT(without, view.cause.rows * view.cause.cols / 20);
+}
+
+// The rule for dark blocks drops no pixel that the plain arithmetic keeps.
+TEST(FringeDecoder, DimFringesAreKeptAsByThePlainArithmetic) {
+  ReconstructionConfig config;
+  config.noise = {.read_noise_dn = 0.4, .gain_dn = 0};
+  config.max_phase_sigma_rad = 0.2;
+  config.mask_border_px = 0;
+  const PatternSet pattern = StationPattern(Background::kShared);
+  const Columns columns = Sweep({640, 200});
+  const auto kept = [&](double modulation_dn, std::optional<SimdPath> path) {
+    const auto frames = RenderColumns(
+        columns, pattern, {.background_dn = 60, .modulation_dn = modulation_dn, .noise = config.noise});
+    return static_cast<double>(Decode(Decoder(pattern, config, path), frames).count[0]) /
+           static_cast<double>(columns.total());
+  };
+  for (const double modulation_dn : {6.0, 7.0, 7.5, 8.0, 8.5, 9.0, 10.0}) {
+    EXPECT_NEAR(kept(modulation_dn, BestSimdPath()), kept(modulation_dn, std::nullopt), 0.01)
+        << modulation_dn;
+  }
+  EXPECT_GT(kept(11, BestSimdPath()), 0.99);
+  EXPECT_LT(kept(6, BestSimdPath()), 0.01);
 }
 
 struct Bin {
@@ -227,7 +281,7 @@ TEST(FringeDecoder, PredictsTheNoiseOfACoordinateInEveryPhase) {
           Bin& bin = bins[static_cast<std::size_t>(16 * (turns - std::floor(turns)))];
           if (std::abs(off) < 1) {
             bin.measured += off * off;
-            bin.predicted += std::pow(static_cast<double>(view.sigma_px(row, column)), 2);
+            bin.predicted += std::pow(static_cast<double>(view.SigmaPx(row, column)), 2);
             ++bin.count;
           }
         }

@@ -7,6 +7,7 @@
 #include <limits>
 #include <random>
 
+#include "services/reconstruction/decoded_view.h"
 #include "services/reconstruction/stereo/kernel.h"
 #include "services/reconstruction/stereo/row_arrays.h"
 
@@ -24,16 +25,18 @@ Row SampleAll(const StereoKernel& kernel) {
   constexpr int kWidth = 53, kHeight = 20, kBlocks = 4;
   std::mt19937 random(9);
   std::uniform_real_distribution<float> uniform(0, 1);
-  std::vector<float> coordinate(kWidth * kHeight), sigma(kWidth * kHeight);
+  std::vector<float> coordinate(kWidth * kHeight);
+  std::vector<std::uint16_t> variance(kWidth * kHeight);
   std::vector<std::uint8_t> cause(kWidth * kHeight);
   for (std::size_t i = 0; i < coordinate.size(); ++i) {
     coordinate[i] =
         static_cast<float>(i % kWidth) + 0.1F * uniform(random) + (uniform(random) > 0.95F ? 9.0F : 0.0F);
-    sigma[i] = 0.02F + 0.01F * uniform(random);
+    const float sigma = 0.02F + 0.01F * uniform(random);
+    variance[i] = UpperOfFloat(sigma * sigma);
     cause[i] = uniform(random) > 0.9F ? 3 : 0;
   }
   const RawView view = {
-      coordinate.data(), sigma.data(), cause.data(), kWidth, kWidth, kWidth, kWidth, kHeight, 3, -1};
+      coordinate.data(), variance.data(), cause.data(), kWidth, kWidth, kWidth, kWidth, kHeight, 3, -1};
   Row all;
   for (int row = -2; row < kHeight; ++row) {
     std::vector<EpipolarBlock> blocks(kBlocks);
