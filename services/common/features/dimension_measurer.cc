@@ -42,6 +42,10 @@ class Measurer {
   }
 
  private:
+  void Remark(const std::string& remark) {
+    made_.remark += made_.remark.empty() ? remark : fmt::format("; {}", remark);
+  }
+
   void Count(const FitQuality& quality) {
     made_.points += quality.used();
     made_.rejected += quality.rejected;
@@ -78,7 +82,7 @@ class Measurer {
                     options_.min_arc_deg);
     if (fit.radius_constrained) return Fail(ErrorCode::kDegenerate, "radius constrained: {}", arc);
     if (fit.axis_constrained) {
-      made_.remark = fmt::format("radius constrained: the axis is held at the nominal one, as {}", arc);
+      Remark(fmt::format("radius constrained: the axis is held at the nominal one, as {}", arc));
     }
     ASSIGN_OR_RETURN(const FaceCloud seen, fits_.Seen(spec.faces));
     Count(fit.quality);
@@ -104,9 +108,8 @@ class Measurer {
                   spec.faces.back());
     }
     if (found.seen_share < kWholeSection) {
-      made_.remark =
-          fmt::format("two-point sizes are seen in {:.0f} % of the directions of the sections only",
-                      100 * found.seen_share);
+      Remark(fmt::format("two-point sizes are seen in {:.0f} % of the directions of the sections only",
+                         100 * found.seen_share));
     }
     std::sort(sizes.begin(), sizes.end(), [](const auto& x, const auto& y) { return x.size_mm < y.size_mm; });
     if (spec.definition == SizeDefinition::kTwoPointMax) sizes.erase(sizes.begin(), sizes.end() - 1);
@@ -149,6 +152,7 @@ class Measurer {
   Result<double> Length(const DimensionSpec& spec) {
     ASSIGN_OR_RETURN(const DatumAxis axis, fits_.Axis(spec.datum));
     Count(axis.quality);
+    if (!axis.remark.empty()) Remark(axis.remark);
     made_.range_mm = 0;  // of the ends, not of the datum
     made_.definition = "along the datum axis, between the least-squares planes of the end faces";
     std::array<End, 2> ends;
@@ -161,8 +165,8 @@ class Measurer {
       if (end.error().code != ErrorCode::kUntrusted) return end.error();
       ASSIGN_OR_RETURN(ends[i], QuantileEnd(spec.faces[i], axis));
       made_.definition = "along the datum axis; quantiles of the points where an end is not plane";
-      made_.remark = fmt::format("end '{}' is not plane ({}): its {:.1f} % quantile along the axis counts",
-                                 spec.faces[i], end.error().message, 100 * kEndShare);
+      Remark(fmt::format("end '{}' is not plane ({}): its {:.1f} % quantile along the axis counts",
+                         spec.faces[i], end.error().message, 100 * kEndShare));
     }
     made_.uncertainty_mm = std::sqrt(ends[0].variance_mm2 + ends[1].variance_mm2);
     return std::abs(ends[0].at_mm - ends[1].at_mm);

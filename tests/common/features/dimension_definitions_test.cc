@@ -145,6 +145,26 @@ TEST_F(DefinitionsTest, AShortArcIsRefusedOrItsAxisIsHeld) {
   EXPECT_EQ(whole.reason, "");
 }
 
+// A datum that is held at the nominal axis is no measured one: the length says so.
+TEST_F(DefinitionsTest, ADatumHeldAtItsNominalAxisIsRemarked) {
+  PointCloud cloud = testing::ScanOf(*model_, {150'000, 0, 0.02, 15}), above;
+  DimensionOptions hold;
+  hold.short_arc = ShortArc::kHoldAxis;
+  EXPECT_EQ(Measure(cloud, kLength, hold).reason, "");
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    const Eigen::Vector3f& p = cloud.points[i];
+    if (p.x() > 815 && cloud.normals[i].z() < 0.5F && cloud.normals[i].x() < 0.9F) continue;
+    above.points.push_back(p);
+    above.normals.push_back(cloud.normals[i]);
+  }
+  const auto held = Measure(above, kLength, hold);
+  ASSERT_TRUE(held.measured_mm) << held.reason;
+  EXPECT_NEAR(*held.measured_mm, 1888.4, 0.01);  // mm: the nominal axis is the true one here
+  EXPECT_NE(held.reason.find("datum 'right_cylinder' is held at its nominal axis"), std::string::npos)
+      << held.reason;
+  EXPECT_EQ(held.reason.find("left_cylinder"), std::string::npos) << held.reason;
+}
+
 // The right end is a dome, 2.5 mm lower at its rim than in the middle.
 TEST_F(DefinitionsTest, AnEndThatIsNotPlaneCountsWithItsQuantile) {
   PointCloud cloud = testing::ScanOf(*model_, {150'000, 0, 0.02, 15});
