@@ -38,6 +38,7 @@ class Measurer {
     if (!value.ok()) return value.error();
     made_.value_mm = *value;
     made_.influence = sum_.Take();
+    made_.influence.extreme = extreme_;
     return made_;
   }
 
@@ -55,9 +56,14 @@ class Measurer {
   void Gather(WeighedPoints seen, const FaceCloud& cloud, const WeighedPoints& ideal, double unknowns) {
     seen.views = cloud.views;
     sum_.Add(seen, ideal, unknowns);
+    CountShell(seen.weights, seen.residuals);
+  }
+
+  // residuals: of the points from the face as a whole.
+  void CountShell(const std::vector<double>& weights, const std::vector<double>& residuals) {
     std::vector<double> used;
-    for (std::size_t i = 0; i < seen.residuals.size(); ++i) {
-      if (seen.weights[i] != 0) used.push_back(seen.residuals[i]);
+    for (std::size_t i = 0; i < residuals.size(); ++i) {
+      if (weights[i] != 0) used.push_back(residuals[i]);
     }
     if (!used.empty()) made_.d95_mm = std::max(made_.d95_mm, ThinnestShellMm(std::move(used)));
   }
@@ -102,6 +108,9 @@ class Measurer {
     const ModelFace& nominal = fits_.Nominal(spec.faces.back());
     if (fit.axis.dot(nominal.direction) < 0) fit.axis = -fit.axis;
     TwoPointSizes found = MeasureTwoPoint(seen.points, fit, nominal.point, spec.sections_mm);
+    if (spec.definition != SizeDefinition::kTwoPointMean) {
+      extreme_ = ExpectedExtreme(found, fit.radius_mm, options_.influence.patch_cell_mm);
+    }
     auto& sizes = found.sizes;
     if (sizes.empty()) {
       return Fail(ErrorCode::kDegenerate, "in no section are opposite points of '{}' seen",
@@ -121,13 +130,21 @@ class Measurer {
           1.0 / static_cast<double>(size.first.size()) + 1.0 / static_cast<double>(size.second.size());
     }
     const auto count = static_cast<double>(sizes.size());
-    // A local size contains the form of its place: there is no form that it misses.
-    const WeighedPoints weighed = WeighTwoPoint(seen.points, fit, sizes);
-    Gather(weighed, seen, weighed, CylinderFit::kUnknowns);
+    GatherTwoPoint(sizes, fit, seen);
     made_.definition = fmt::format("{} (ISO 14405-1): two-point size in {} sections",
                                    SizeDefinitionName(spec.definition), spec.sections_mm.size());
     made_.uncertainty_mm = fit.quality.sigma_mm * std::sqrt(variance) / count;
     return sum / count;
+  }
+
+  // A local size contains the form of its place: there is no form that it misses.
+  void GatherTwoPoint(std::span<const TwoPointSize> sizes, const CylinderFit& fit, const FaceCloud& seen) {
+    WeighedPoints weighed = WeighTwoPoint(seen.points, fit, sizes);
+    weighed.views = seen.views;
+    sum_.Add(weighed, weighed, 0);
+    std::vector<double> residuals;
+    for (const Eigen::Vector3d& p : seen.points) residuals.push_back(fit.Residual(p));
+    CountShell(weighed.weights, residuals);
   }
 
   Result<double> Width(const DimensionSpec& spec) {
@@ -218,6 +235,7 @@ class Measurer {
   const FaceFits& fits_;
   const DimensionOptions& options_;
   InfluenceSum sum_;
+  double extreme_ = 0;  // see Influence
   DimensionMeasurement made_;
 };
 

@@ -108,6 +108,10 @@ TEST_F(DefinitionsTest, TwoPointSizesOfAnOvalCylinder) {
     EXPECT_EQ(lp.definition.find(name), 0U) << lp.definition;
     EXPECT_EQ(lp.reason, "");
     EXPECT_LT(lp.standard_uncertainty_mm, 0.05);
+    // 135 sizes, 3.1 mm apart around the section, and patches of 12 mm.
+    EXPECT_NEAR(lp.influence.extreme,
+                std::string(name) == "LP mean" ? 0 : std::sqrt(2 * std::log(135 * 3.09 / 12)), 0.001)
+        << name;
   }
 }
 
