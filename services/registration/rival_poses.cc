@@ -109,17 +109,6 @@ bool IsStronger(const RivalPose& a, const RivalPose& b, const IcpOptions& option
 
 }  // namespace
 
-double CornerMotionMm(const Eigen::Isometry3d& motion, const RegistrationModel& model) {
-  double worst = 0;
-  for (int corner = 0; corner < 8; ++corner) {
-    const auto side = [corner](int axis) { return (corner >> axis & 1) != 0; };
-    Eigen::Vector3d p;
-    for (int axis = 0; axis < 3; ++axis) p[axis] = (side(axis) ? model.box_high() : model.box_low())[axis];
-    worst = std::max(worst, (motion * p - p).norm());
-  }
-  return worst;
-}
-
 Eigen::Isometry3d HalfTurn(const RegistrationModel& model, int axis) {
   const Eigen::Translation3d center(model.center());
   return center * Eigen::AngleAxisd(std::numbers::pi, Eigen::Vector3d::Unit(axis)) * center.inverse();

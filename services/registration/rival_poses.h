@@ -57,9 +57,6 @@ std::optional<RivalPose> FindRival(const ScanSample& sample, const RegistrationM
 // options.turned_ratio of it.
 Status CheckRival(const RivalPose& rival, const IcpOptions& options);
 
-// Farthest that a corner of the model's box moves. Units: mm. Frames: model.
-double CornerMotionMm(const Eigen::Isometry3d& motion, const RegistrationModel& model);
-
 // A half turn about model axis 0, 1 or 2 through the box's centre.
 Eigen::Isometry3d HalfTurn(const RegistrationModel& model, int axis);
 // Whether the motion maps the model onto itself, to the precision of its triangles.
