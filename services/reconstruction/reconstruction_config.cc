@@ -44,6 +44,7 @@ Status Check(const ReconstructionConfig& c) {
       Range{"max_disagreement_rad", c.max_disagreement_rad, 0, 4},
       Range{"max_shared_second_harmonic", c.max_shared_second_harmonic, 0, 1},
       Range{"max_drift_phase_rad", c.max_drift_phase_rad, 0, 4},
+      Range{"min_uncut_reference_fraction", c.min_uncut_reference_fraction, 0, 1},
       Range{"max_saturated_fraction", c.max_saturated_fraction, 0, 1},
       Range{"max_median_projector_residual_px", c.max_median_projector_residual_px, 0, 1000},
       Range{"max_column_rms_px", c.max_column_rms_px, 0, 1000},

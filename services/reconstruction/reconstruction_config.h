@@ -54,6 +54,9 @@ struct ReconstructionConfig {
   double max_drift_phase_rad = 0.05;  // a drift of the background bends a phase by more than this at worst,
                                       // and the background is shared; a contrast of the white frame that is 1
                                       // % off looks like 0.01 rad,
+  double min_uncut_reference_fraction =
+      0.5;  // less than this part of the lit pixels shows the reference frame not cut off, and the background
+            // is shared: the median drift would be that of the rest,
   double max_saturated_fraction = 0.2;  // more than this part of the lit pixels is saturated,
   double max_median_projector_residual_px =
       0.2;                             // the projector disagrees by more than this: the calibration drifted,

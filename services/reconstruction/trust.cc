@@ -13,6 +13,8 @@
 namespace forgescan {
 namespace {
 
+constexpr double kFullScaleDn = 255;
+
 // Median of the rms of n normal values of standard deviation 1: what a robust rms divides by.
 double MedianOfRms(int n) { return n == 1 ? 0.6745 : 0.8326; }
 
@@ -100,11 +102,13 @@ double HarmonicGain(const FringeDecoder& decoder) {
 // Collects the figures pixel by pixel.
 class TrustSampler {
  public:
+  // clipping_dn: where the camera cuts off, if below full scale.
   TrustSampler(std::span<const cv::Mat> frames, const FringeDecoder& decoder,
-               const ReconstructionConfig& config)
+               const ReconstructionConfig& config, const std::optional<double>& clipping_dn)
       : pixel_(frames, decoder.estimator(), GreyScale(frames[0], config)),
         decoder_(decoder),
         noise_(config.noise),
+        uncut_dn_(kUncutShare * clipping_dn.value_or(kFullScaleDn)),
         errors_(decoder.estimator().cosine.rows()) {}
 
   void AddSaturated() { ++saturated_; }
@@ -132,6 +136,10 @@ class TrustSampler {
     figures.predicted_disagreement_rad = std::sqrt(predicted_square_ / static_cast<double>(lit_));
     figures.saturated_fraction = static_cast<double>(saturated_) / static_cast<double>(saturated_ + lit_);
     FinishHarmonic(figures);
+    if (decoder_.pattern().reference_frame_index) {
+      figures.uncut_reference_fraction =
+          static_cast<double>(drift_ratio_.total()) / static_cast<double>(lit_);
+    }
     if (drift_ratio_.total() > 0) {
       const auto& gains = decoder_.estimator().drift_gain;
       figures.drift_dn = drift_dn_.Median();
@@ -142,14 +150,16 @@ class TrustSampler {
   }
 
  private:
+  static constexpr double kUncutShare = 0.98;  // of full scale: a brighter reference may be saturated
+  static constexpr double kBlackDn = 2;        // a darker one may lie below what the camera shows
+
   // The reference shows the background at its own time, the fringes at theirs.
   void AddDrift(const Eigen::VectorXd& grey, const std::vector<std::complex<double>>& phasors) {
-    constexpr double kUncut = 250;  // DN: a brighter reference may be saturated
     const PatternSet& pattern = decoder_.pattern();
     const PhaseEstimator& estimator = decoder_.estimator();
-    if (!pattern.reference_frame_index || grey(*pattern.reference_frame_index) > kUncut) {
-      return;
-    }
+    if (!pattern.reference_frame_index) return;
+    const double reference = grey(*pattern.reference_frame_index);
+    if (reference > uncut_dn_ || reference < kBlackDn) return;
     const double modulation = std::abs(phasors[0]);
     double drift = 0;
     if (estimator.drift) {
@@ -158,16 +168,14 @@ class TrustSampler {
       const double level =
           estimator.background.row(0).dot(grey) + pattern.ReferencePerModulation() * modulation;
       const auto times = Eigen::VectorXd::LinSpaced(grey.size(), 0, static_cast<double>(grey.size() - 1));
-      drift = (grey(*pattern.reference_frame_index) - level) /
-              (*pattern.reference_frame_index - estimator.background.row(0).dot(times));
+      drift = (reference - level) / (*pattern.reference_frame_index - estimator.background.row(0).dot(times));
     }
     drift_dn_.Add(drift);
     drift_ratio_.Add(drift / modulation);
   }
 
   // Without a matrix of its own: it is done for every sample.
-  double PredictedSquare(const Eigen::VectorXd& grey,
-                         const std::vector<std::complex<double>>& phasors) {
+  double PredictedSquare(const Eigen::VectorXd& grey, const std::vector<std::complex<double>>& phasors) {
     const PhaseEstimator& estimator = decoder_.estimator();
     double sum = 0;
     for (Eigen::Index i = 0; i < grey.size(); ++i) {
@@ -213,6 +221,7 @@ class TrustSampler {
   PixelSampler pixel_;
   const FringeDecoder& decoder_;
   CameraNoise noise_;
+  double uncut_dn_;
   Eigen::VectorXd errors_;  // of the phases, scratch
   HistogramMedian disagreement_{0, 4, 40000};
   HistogramMedian drift_dn_{-32, 32, 32000};
@@ -235,7 +244,7 @@ bool IsLit(MaskCause cause) {
 Result<TrustFigures> MeasureTrust(std::span<const cv::Mat> frames, const DecodedView& view,
                                   const FringeDecoder& decoder, const ReconstructionConfig& config) {
   const int step = SamplingStep(view.cause.size());
-  TrustSampler sampler(frames, decoder, config);
+  TrustSampler sampler(frames, decoder, config, view.clipping_dn);
   for (int row = step / 2; row < view.cause.rows; row += step) {
     for (int column = step / 2; column < view.cause.cols; column += step) {
       const auto cause = static_cast<MaskCause>(view.cause(row, column));
@@ -254,41 +263,6 @@ Result<TrustFigures> MeasureTrust(std::span<const cv::Mat> frames, const Decoded
     figures.suspected_second_harmonic = std::sqrt(excess) / gain;
   }
   return figures;
-}
-
-Status JudgeTrust(const TrustFigures& figures, const FringeDecoder& decoder,
-                  const ReconstructionConfig& config, const char* camera) {
-  const bool shared = decoder.pattern().background == Background::kShared;
-  if (figures.saturated_fraction > config.max_saturated_fraction) {
-    return Fail(ErrorCode::kUntrusted,
-                "{:.0f} % of the lit pixels of the {} camera are saturated, limit {:.0f} %: expose less",
-                100 * figures.saturated_fraction, camera, 100 * config.max_saturated_fraction);
-  }
-  if (figures.disagreement_rad > config.max_disagreement_rad) {
-    return Fail(ErrorCode::kUntrusted,
-                "the frequencies disagree by {:.3f} rad rms in the {} camera, limit {:.3f}: {}",
-                figures.disagreement_rad, camera, config.max_disagreement_rad,
-                shared ? "this projector is not linear enough for a shared background, or a frame is not "
-                         "what the pattern set says"
-                       : "a frame is not what the pattern set says, or the scene moved");
-  }
-  if (shared && figures.drift_phase_rad && *figures.drift_phase_rad > config.max_drift_phase_rad) {
-    return Fail(ErrorCode::kUntrusted,
-                "the background of the {} camera drifts by {:.2f} grey values a frame, which bends the "
-                "phases by up to {:.3f} "
-                "rad, limit {:.3f}: too much for a shared background",
-                camera, *figures.drift_dn, *figures.drift_phase_rad, config.max_drift_phase_rad);
-  }
-  const auto harmonic =
-      figures.second_harmonic_ratio ? figures.second_harmonic_ratio : figures.suspected_second_harmonic;
-  if (shared && harmonic && *harmonic > config.max_shared_second_harmonic) {
-    return Fail(ErrorCode::kUntrusted,
-                "the projector's 2nd harmonic is about {:.3f} of the 1st in the {} camera, limit {:.3f}: "
-                "this projector is not "
-                "linear enough for a shared background",
-                *harmonic, camera, config.max_shared_second_harmonic);
-  }
-  return {};
 }
 
 }  // namespace forgescan

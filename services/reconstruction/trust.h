@@ -16,9 +16,11 @@ struct TrustFigures {
   double predicted_disagreement_rad = 0;  // what the noise model alone would give
   double saturated_fraction = 0;          // of the lit pixels
   std::optional<double> noise_dn;  // rms of a grey value about model and harmonic; needs redundant frames
-  std::optional<double> second_harmonic_ratio;  // 2nd over 1st harmonic, measured; needs redundant frames
-  std::optional<double> drift_dn;               // of the background a frame, median; needs a reference frame
-  std::optional<double> drift_phase_rad;        // the largest phase error this drift causes
+  std::optional<double> second_harmonic_ratio;     // 2nd over 1st harmonic, measured; needs redundant frames
+  std::optional<double> uncut_reference_fraction;  // of the lit pixels; needs a reference frame
+  std::optional<double> drift_dn;  // of the background a frame, median; needs a reference frame that is not
+                                   // cut off, saturated or black, in some of them
+  std::optional<double> drift_phase_rad;            // the largest phase error this drift causes
   std::optional<double> suspected_second_harmonic;  // the 2nd harmonic that would explain the disagreement
 };
 

@@ -131,34 +131,56 @@ std::vector<Eigen::Isometry3d> BestDifferent(const RegistrationModel& model,
   return best;
 }
 
+// About the principal axes, in the model's frame.
+std::vector<Eigen::Isometry3d> HalfTurns(const PrincipalFrame& model) {
+  const Eigen::Translation3d center(model.center);
+  std::vector<Eigen::Isometry3d> turns;
+  for (int axis = 0; axis < 3; ++axis) {
+    turns.emplace_back(center * Eigen::AngleAxisd(std::numbers::pi, model.axes.col(axis)) * center.inverse());
+  }
+  return turns;
+}
+
 // The half turned poses too: of all wrong poses they are the ones most like the right one.
 std::vector<Eigen::Isometry3d> WithHalfTurns(const RegistrationModel& model,
-                                             const std::vector<Candidate>& candidates) {
+                                             const std::vector<Candidate>& candidates,
+                                             const std::vector<Eigen::Isometry3d>& turns) {
   std::vector<Eigen::Isometry3d> poses = BestDifferent(model, candidates, kThirdRound);
   if (poses.empty()) return poses;
   const Eigen::Isometry3d best = poses.front();
-  for (int axis = 0; axis < 3; ++axis) poses.push_back(HalfTurn(model, axis) * best);
+  for (const Eigen::Isometry3d& turn : turns) poses.push_back(turn * best);
   return poses;
 }
 
-// The best ones through RegisterScan, without those that score far worse than the best of them. Errors: that
-// of the best one, if none passes.
-Result<std::vector<Registration>> RegisterBest(const PointCloud& scan, const RegistrationModel& model,
-                                               const std::vector<Candidate>& candidates,
-                                               const IcpOptions& options) {
+// What the last round leaves. A pose that RegisterScan refuses, or that was not tried, still tells against
+// the others.
+struct Finalists {
+  std::vector<Registration> passed;
+  std::vector<Eigen::Isometry3d> refused;
+};
+
+// The best ones through RegisterScan. Errors: that of the best one, if none passes.
+Result<Finalists> RegisterBest(const PointCloud& scan, const RegistrationModel& model,
+                               const std::vector<Candidate>& candidates, const IcpOptions& options) {
   IcpOptions alone = options;  // the poses found are compared with each other
   alone.turned_ratio = 0;
-  std::vector<Registration> passed;
+  Finalists finalists;
   std::optional<Error> first;
-  for (const Eigen::Isometry3d& start : BestDifferent(model, candidates, kLastRound)) {
-    auto result = RegisterScan(scan, model, start, alone);
+  const auto starts = BestDifferent(model, candidates, candidates.size());
+  for (std::size_t i = 0; i < starts.size(); ++i) {
+    if (i >= kLastRound) {
+      finalists.refused.push_back(starts[i]);
+      continue;
+    }
+    auto result = RegisterScan(scan, model, starts[i], alone);
     if (result.ok()) {
-      passed.push_back(std::move(*result));
-    } else if (!first) {
-      first = result.error();
+      finalists.passed.push_back(std::move(*result));
+    } else {
+      finalists.refused.push_back(starts[i]);
+      if (!first) first = result.error();
     }
   }
-  if (!passed.empty()) return passed;
+  if (!finalists.passed.empty()) return finalists;
   return first ? *first : Fail(ErrorCode::kUntrusted, "no pose of the part explains the scan");
 }
 
@@ -170,19 +192,50 @@ std::vector<Candidate> WithoutHopeless(std::vector<Candidate> candidates) {
 }
 
 // Of the poses that pass RegisterScan, the one that scores best against every other.
-Result<Registration> Choose(const ScanSample& sample, const RegistrationModel& model,
-                            const std::vector<Registration>& passed, const IcpOptions& options) {
+const Registration& BestOf(const ScanSample& sample, const RegistrationModel& model,
+                           const std::vector<Registration>& passed, const IcpOptions& options) {
   const Registration* best = &passed.front();
   for (const Registration& other : passed) {
     const PoseScores scores =
         CompareScores(sample, model, best->model_from_scan, other.model_from_scan, options);
     if (scores.other_mm < scores.one_mm) best = &other;
   }
-  for (const Registration& other : passed) {
-    const Eigen::Isometry3d motion = other.model_from_scan * best->model_from_scan.inverse();
-    if (CornerMotionMm(motion, model) < kSamePoseMm || IsSymmetry(model, motion)) continue;
-    const PoseScores scores =
-        CompareScores(sample, model, best->model_from_scan, other.model_from_scan, options);
+  return *best;
+}
+
+// Everything that may be said instead of `search.found`: what else passed, what was refused, and its own half
+// turns.
+std::vector<Eigen::Isometry3d> RivalsOf(const RivalSearch& search, const Finalists& finalists,
+                                        const std::vector<Eigen::Isometry3d>& turns) {
+  std::vector<Eigen::Isometry3d> from = finalists.refused, rivals;
+  for (const Eigen::Isometry3d& turn : turns) from.emplace_back(turn * search.found);
+  for (const Registration& other : finalists.passed) rivals.push_back(other.model_from_scan);
+  for (const Eigen::Isometry3d& pose : from) {
+    const auto settled = SettleRival(search, pose, std::max(search.options.start_translation_mm, 1.0));
+    if (settled) rivals.push_back(settled->model_from_scan);
+  }
+  return rivals;
+}
+
+// Whether the motion leads to the same pose, or to the same by a half turn that maps the part onto itself.
+bool LeadsBack(const RegistrationModel& model, const Eigen::Isometry3d& motion,
+               const std::vector<Eigen::Isometry3d>& turns) {
+  if (CornerMotionMm(motion, model) < kSamePoseMm || IsSymmetry(model, motion)) return true;
+  return std::ranges::any_of(turns, [&](const Eigen::Isometry3d& turn) {
+    return CornerMotionMm(turn * motion, model) < kSamePoseMm && IsSymmetry(model, turn);
+  });
+}
+
+// The best pose, unless another one explains the scan about as well.
+Result<Registration> Choose(const ScanSample& sample, const RegistrationModel& model,
+                            const Finalists& finalists, const std::vector<Eigen::Isometry3d>& turns,
+                            const IcpOptions& options) {
+  Registration best = BestOf(sample, model, finalists.passed, options);
+  for (const auto& other : RivalsOf({sample, model, best.model_from_scan, options}, finalists, turns)) {
+    const Eigen::Isometry3d motion = other * best.model_from_scan.inverse();
+    if (LeadsBack(model, motion, turns)) continue;
+    const PoseScores scores = CompareScores(sample, model, best.model_from_scan, other, options);
+    best.rival_ratio = std::min(best.rival_ratio, scores.Ratio());
     if (scores.other_mm > options.rival_ratio * scores.one_mm) continue;
     return Fail(
         ErrorCode::kUntrusted,
@@ -191,7 +244,7 @@ Result<Registration> Choose(const ScanSample& sample, const RegistrationModel& m
         scores.one_mm, Eigen::AngleAxisd(motion.linear()).angle() * 180 / std::numbers::pi, scores.other_mm,
         options.rival_ratio);
   }
-  return *best;
+  return best;
 }
 
 }  // namespace
@@ -213,14 +266,15 @@ Result<Registration> SearchPose(const PointCloud& scan, const RegistrationModel&
     return Fail(ErrorCode::kDegenerate, "the scan has {} finite points, at least {} are needed",
                 finite.size(), options.min_inliers);
   }
-  const auto starts = Starts(PrincipalFrameOf(more.points), PrincipalFrameOf(model.sample_points()));
+  const PrincipalFrame model_frame = PrincipalFrameOf(model.sample_points());
+  const auto starts = Starts(PrincipalFrameOf(more.points), model_frame), turns = HalfTurns(model_frame);
   const auto first = AlignAll({few, model, kFirstIterations}, starts, options);
   const auto second =
       AlignAll({more, model, kSecondIterations}, BestDifferent(model, first, kSecondRound), options);
-  const auto third = AlignAll({more, model, kSecondIterations}, WithHalfTurns(model, second), options);
+  const auto third = AlignAll({more, model, kSecondIterations}, WithHalfTurns(model, second, turns), options);
   if (third.empty()) return Fail(ErrorCode::kUntrusted, "no pose of the part explains the scan");
-  ASSIGN_OR_RETURN(const auto passed, RegisterBest(scan, model, WithoutHopeless(third), options));
-  return Choose(more, model, passed, options);
+  ASSIGN_OR_RETURN(const auto finalists, RegisterBest(scan, model, WithoutHopeless(third), options));
+  return Choose(more, model, finalists, turns, options);
 }
 
 }  // namespace forgescan

@@ -1,6 +1,6 @@
 #include "services/registration/registration_model.h"
 
-#include <Eigen/Geometry>
+#include <algorithm>
 
 namespace forgescan {
 
@@ -23,6 +23,17 @@ Result<RegistrationModel> RegistrationModel::Build(const ModelBundle& bundle) {
   RETURN_IF_ERROR(Check(bundle));
   ASSIGN_OR_RETURN(TriangleIndex surface, TriangleIndex::Build(bundle.vertices, bundle.triangles));
   return RegistrationModel(std::move(surface), bundle);
+}
+
+double CornerMotionMm(const Eigen::Isometry3d& motion, const RegistrationModel& model) {
+  double worst = 0;
+  for (int corner = 0; corner < 8; ++corner) {
+    const auto side = [corner](int axis) { return (corner >> axis & 1) != 0; };
+    Eigen::Vector3d p;
+    for (int axis = 0; axis < 3; ++axis) p[axis] = (side(axis) ? model.box_high() : model.box_low())[axis];
+    worst = std::max(worst, (motion * p - p).norm());
+  }
+  return worst;
 }
 
 }  // namespace forgescan

@@ -1,7 +1,7 @@
 // The design model in the shape registration needs it: its surface, with the bundle's grid for the search.
 #pragma once
 
-#include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <optional>
 #include <vector>
 
@@ -51,5 +51,8 @@ class RegistrationModel {
   double spacing_mm_;
   double chord_error_mm_;
 };
+
+// Farthest that a corner of the model's box moves. Units: mm. Frames: model.
+double CornerMotionMm(const Eigen::Isometry3d& motion, const RegistrationModel& model);
 
 }  // namespace forgescan

@@ -50,15 +50,8 @@ struct Valley {
   double score_mm;
 };
 
-struct Search {
-  const ScanSample& sample;  // kAlignPoints
-  const RegistrationModel& model;
-  const Eigen::Isometry3d& found;
-  const IcpOptions& options;
-};
-
 // Appends the valleys of the score along one axis to one side, behind a ridge.
-void AddValleys(const Search& search, const ScanSample& few, const std::vector<Eigen::Isometry3d>& poses,
+void AddValleys(const RivalSearch& search, const ScanSample& few, const std::vector<Eigen::Isometry3d>& poses,
                 std::vector<Valley>& valleys) {
   const IcpOptions& o = search.options;
   std::vector<double> scores;
@@ -77,7 +70,7 @@ void AddValleys(const Search& search, const ScanSample& few, const std::vector<E
 }
 
 // The lowest valleys along and about all axes.
-std::vector<Valley> FindValleys(const Search& search) {
+std::vector<Valley> FindValleys(const RivalSearch& search) {
   const ScanSample few = Thinned(search.sample, kProfilePoints);
   std::vector<Valley> valleys;
   for (int axis = 0; axis < 6; ++axis) {
@@ -99,36 +92,7 @@ std::vector<Valley> FindValleys(const Search& search) {
   return valleys;
 }
 
-// A short alignment from there; nothing if it fails, is hopeless or ends in the valley of `found`.
-std::optional<RivalPose> Settle(const Search& search, const Eigen::Isometry3d& from, double gate_mm) {
-  IcpOptions options = search.options;
-  options.max_iterations = kRivalIterations;
-  options.min_eigenvalue = 0;
-  options.threads = 1;  // so few points are done before another thread has begun
-  const auto coarse = AlignCoarse(search.sample, search.model, options, {from, 0, gate_mm});
-  if (!coarse.ok()) return std::nullopt;
-  const auto compare = [&](const Eigen::Isometry3d& pose) {
-    return CompareScores(search.sample, search.model, search.found, pose, options);
-  };
-  const PoseScores rough = compare(coarse->model_from_scan);
-  if (rough.other_mm > kHopeless * rough.one_mm) return std::nullopt;
-  const auto fine = AlignFine(search.sample, search.model, options, options.stop_mm,
-                              BeginFine(search.model, options, *coarse));
-  if (!fine.ok()) return std::nullopt;
-  const Eigen::Isometry3d& pose = fine->align.model_from_scan;
-  const Eigen::Isometry3d motion = pose * search.found.inverse();
-  const double same_mm = kSamePoseShare * std::max(options.threshold_floor_mm, search.model.spacing_mm());
-  if (CornerMotionMm(motion, search.model) < same_mm) return std::nullopt;
-  const Eigen::AngleAxisd turn(motion.linear());
-  const Eigen::Vector3d shift = motion * search.model.center() - search.model.center();
-  return RivalPose{
-      pose, compare(pose), false,
-      fmt::format("({:.2f}, {:.2f}, {:.2f}) mm and {:.2f} degrees about ({:.2f}, {:.2f}, {:.2f})", shift.x(),
-                  shift.y(), shift.z(), turn.angle() * 180 / std::numbers::pi, turn.axis().x(),
-                  turn.axis().y(), turn.axis().z())};
-}
-
-bool StartAllows(const Search& search, const Eigen::Isometry3d& start, const Eigen::Isometry3d& pose) {
+bool StartAllows(const RivalSearch& search, const Eigen::Isometry3d& start, const Eigen::Isometry3d& pose) {
   const Eigen::Isometry3d correction = pose * start.inverse();
   const Eigen::Vector3d center = search.model.center();
   return (correction * center - center).norm() <= kStartFactor * search.options.start_translation_mm &&
@@ -144,17 +108,6 @@ bool IsStronger(const RivalPose& a, const RivalPose& b, const IcpOptions& option
 }
 
 }  // namespace
-
-double CornerMotionMm(const Eigen::Isometry3d& motion, const RegistrationModel& model) {
-  double worst = 0;
-  for (int corner = 0; corner < 8; ++corner) {
-    const auto side = [corner](int axis) { return (corner >> axis & 1) != 0; };
-    Eigen::Vector3d p;
-    for (int axis = 0; axis < 3; ++axis) p[axis] = (side(axis) ? model.box_high() : model.box_low())[axis];
-    worst = std::max(worst, (motion * p - p).norm());
-  }
-  return worst;
-}
 
 Eigen::Isometry3d HalfTurn(const RegistrationModel& model, int axis) {
   const Eigen::Translation3d center(model.center());
@@ -183,14 +136,43 @@ PoseScores CompareScores(const ScanSample& sample, const RegistrationModel& mode
   return {sum_one / std::max(count, 1.0), sum_other / std::max(count, 1.0)};
 }
 
+std::optional<RivalPose> SettleRival(const RivalSearch& search, const Eigen::Isometry3d& from,
+                                     double gate_mm) {
+  IcpOptions options = search.options;
+  options.max_iterations = kRivalIterations;
+  options.min_eigenvalue = 0;
+  options.threads = 1;  // so few points are done before another thread has begun
+  const auto coarse = AlignCoarse(search.sample, search.model, options, {from, 0, gate_mm});
+  if (!coarse.ok()) return std::nullopt;
+  const auto compare = [&](const Eigen::Isometry3d& pose) {
+    return CompareScores(search.sample, search.model, search.found, pose, options);
+  };
+  const PoseScores rough = compare(coarse->model_from_scan);
+  if (rough.other_mm > kHopeless * rough.one_mm) return std::nullopt;
+  const auto fine = AlignFine(search.sample, search.model, options, options.stop_mm,
+                              BeginFine(search.model, options, *coarse));
+  if (!fine.ok()) return std::nullopt;
+  const Eigen::Isometry3d& pose = fine->align.model_from_scan;
+  const Eigen::Isometry3d motion = pose * search.found.inverse();
+  const double same_mm = kSamePoseShare * std::max(options.threshold_floor_mm, search.model.spacing_mm());
+  if (CornerMotionMm(motion, search.model) < same_mm) return std::nullopt;
+  const Eigen::AngleAxisd turn(motion.linear());
+  const Eigen::Vector3d shift = motion * search.model.center() - search.model.center();
+  return RivalPose{
+      pose, compare(pose), false,
+      fmt::format("({:.2f}, {:.2f}, {:.2f}) mm and {:.2f} degrees about ({:.2f}, {:.2f}, {:.2f})", shift.x(),
+                  shift.y(), shift.z(), turn.angle() * 180 / std::numbers::pi, turn.axis().x(),
+                  turn.axis().y(), turn.axis().z())};
+}
+
 std::optional<RivalPose> FindRival(const ScanSample& sample, const RegistrationModel& model,
                                    const Eigen::Isometry3d& start, const Eigen::Isometry3d& found,
                                    const IcpOptions& options) {
   const ScanSample some = Thinned(sample, kAlignPoints);
-  const Search search{some, model, found, options};
+  const RivalSearch search{some, model, found, options};
   std::optional<RivalPose> strongest;
   const auto consider = [&](const Eigen::Isometry3d& from, double gate_mm, bool from_start) {
-    auto rival = Settle(search, from, gate_mm);
+    auto rival = SettleRival(search, from, gate_mm);
     if (!rival || from_start != StartAllows(search, start, rival->model_from_scan)) return;
     rival->from_start = from_start;
     if (!strongest || IsStronger(*rival, *strongest, options)) strongest = std::move(rival);

@@ -30,6 +30,19 @@ struct RivalPose {
   std::string motion;  // from the pose found to this one, for a person
 };
 
+// Where a rival is looked for.
+struct RivalSearch {
+  const ScanSample& sample;
+  const RegistrationModel& model;
+  const Eigen::Isometry3d& found;
+  const IcpOptions& options;
+};
+
+// A short alignment from there, from_start left false; nothing if it fails, is hopeless or ends in the valley
+// of `found`.
+std::optional<RivalPose> SettleRival(const RivalSearch& search, const Eigen::Isometry3d& from,
+                                     double gate_mm);
+
 // Purpose: the rival that fits best, of those the start allows and of the half turns. Method: the score along
 // and about each of the model's axes, as far as twice the start's uncertainty; from every valley that is not
 // the one of `found`, and from a half turn about each axis, a short alignment. A half turn that maps the
@@ -43,9 +56,6 @@ std::optional<RivalPose> FindRival(const ScanSample& sample, const RegistrationM
 // no worse than options.rival_ratio times the pose found, or the half turned one better than
 // options.turned_ratio of it.
 Status CheckRival(const RivalPose& rival, const IcpOptions& options);
-
-// Farthest that a corner of the model's box moves. Units: mm. Frames: model.
-double CornerMotionMm(const Eigen::Isometry3d& motion, const RegistrationModel& model);
 
 // A half turn about model axis 0, 1 or 2 through the box's centre.
 Eigen::Isometry3d HalfTurn(const RegistrationModel& model, int axis);

@@ -1,6 +1,7 @@
 #include "services/report/uncertainty.h"
 
 #include <cmath>
+#include <numbers>
 
 namespace forgescan {
 namespace {
@@ -64,9 +65,12 @@ std::vector<UncertaintyTerm> UncertaintyTerms(const UncertaintyBudget& budget, c
   }
   const double slope = budget.expansion_slope_per_k;
   const double scatter_mm = influence.views.empty() ? fit_mm : influence.noise_mm;
+  const double patch_mm = budget.patch_mm * used.patch;
+  const double extreme_mm = used.extreme * std::hypot(scatter_mm, patch_mm) / std::numbers::sqrt3;
   return {{"scatter of the points", scatter_mm},
           {"form of the faces", used.form_mm},
-          {"patches of a view", budget.patch_mm * used.patch},
+          {"patches of a view", patch_mm},
+          {"extreme of many readings", extreme_mm},
           {"view matrices", OfViews(used, budget.view_shift_mm, budget.view_turn_rad)},
           {"robot", OfViews(used, budget.robot_shift_mm, budget.robot_turn_rad)},
           {"refraction", OfViews(used, budget.refraction_mm, 0)},

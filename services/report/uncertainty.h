@@ -34,9 +34,13 @@ struct UncertaintyTerm {
 };
 
 // Purpose: the contributions to the standard uncertainty of a size, independent of each other. Source: GUM
-// (JCGM 100), law of propagation; the size's derivatives are those of the fits. A size without influence (a
-// source that knows nothing of views) is taken as one between two opposite views. fit_mm: from the scatter of
-// the points as if independent, used without an influence. Units: mm.
+// (JCGM 100), law of propagation; the size's derivatives are those of the fits. A size chosen as the largest
+// or smallest of many readings is off outwards by anything from nothing, where form decides, to the expected
+// extreme of the readings' errors, where the face is perfect: evenly distributed in between (GUM 4.3.7) and
+// not corrected, its root mean square is that extreme over the root of 3. Errors a whole view shares are not
+// chosen from: they move many readings at once. A size without influence (a source that knows nothing of
+// views) is taken as one between two opposite views. fit_mm: from the scatter of the points as if
+// independent, used without an influence. Units: mm.
 std::vector<UncertaintyTerm> UncertaintyTerms(const UncertaintyBudget& budget, const Influence& influence,
                                               double size_mm, double fit_mm);
 

@@ -10,6 +10,7 @@
 #include <stdexcept>
 
 #include "services/common/features/deviation_surface.h"
+#include "services/common/geometry/nearest_on_triangle.h"
 
 #ifdef FORGESCAN_HAVE_CGAL
 #include <CGAL/AABB_traits.h>
@@ -144,33 +145,12 @@ struct EmbreeQuery {
   float squared, height;
 };
 
-Eigen::Vector3f NearestOnTriangle(const Eigen::Vector3f& p, const Eigen::Vector3f& a,
-                                  const Eigen::Vector3f& b, const Eigen::Vector3f& c) {
-  const Eigen::Vector3f ab = b - a, ac = c - a, ap = p - a;
-  const float d1 = ab.dot(ap), d2 = ac.dot(ap);
-  if (d1 <= 0 && d2 <= 0) return a;
-  const Eigen::Vector3f bp = p - b;
-  const float d3 = ab.dot(bp), d4 = ac.dot(bp);
-  if (d3 >= 0 && d4 <= d3) return b;
-  const float vc = d1 * d4 - d3 * d2;
-  if (vc <= 0 && d1 >= 0 && d3 <= 0) return a + ab * (d1 / (d1 - d3));
-  const Eigen::Vector3f cp = p - c;
-  const float d5 = ab.dot(cp), d6 = ac.dot(cp);
-  if (d6 >= 0 && d5 <= d6) return c;
-  const float vb = d5 * d2 - d1 * d6;
-  if (vb <= 0 && d2 >= 0 && d6 <= 0) return a + ac * (d2 / (d2 - d6));
-  const float va = d3 * d6 - d5 * d4;
-  if (va <= 0 && d4 >= d3 && d5 >= d6) return b + (c - b) * ((d4 - d3) / ((d4 - d3) + (d5 - d6)));
-  const float scale = 1 / (va + vb + vc);
-  return a + ab * (vb * scale) + ac * (vc * scale);
-}
-
 bool OnTriangle(RTCPointQueryFunctionArguments* arguments) {
   auto& query = *static_cast<EmbreeQuery*>(arguments->userPtr);
   const TriangleCorners& t = query.data->triangles[arguments->primID];
   const Eigen::Vector3f &a = query.data->vertices[t[0]], &b = query.data->vertices[t[1]],
                         &c = query.data->vertices[t[2]];
-  const Eigen::Vector3f arm = query.point - NearestOnTriangle(query.point, a, b, c);
+  const Eigen::Vector3f arm = query.point - NearestOnTriangle(query.point, a, b - a, c - a);
   const float squared = arm.squaredNorm();
   if (!(squared < query.squared * (1 + 1e-5F))) return false;
   const float height = query.data->normals[arguments->primID].dot(arm);

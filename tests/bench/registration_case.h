@@ -39,22 +39,10 @@ inline const RegistrationCase& TheRegistration() {
   return only;
 }
 
-inline double WorstCornerMm(const Eigen::Isometry3d& error, const RegistrationModel& model) {
-  double worst = 0;
-  for (const double x : {model.box_low().x(), model.box_high().x()}) {
-    for (const double y : {model.box_low().y(), model.box_high().y()}) {
-      for (const double z : {model.box_low().z(), model.box_high().z()}) {
-        worst = std::max(worst, (error * Eigen::Vector3d(x, y, z) - Eigen::Vector3d(x, y, z)).norm());
-      }
-    }
-  }
-  return worst;
-}
-
 // Enters how far the result is off; a result that is off too far is no result.
 inline void Judge(benchmark::State& state, const Eigen::Isometry3d& model_from_scan, double within_mm) {
   const RegistrationCase& c = TheRegistration();
-  const double worst_mm = WorstCornerMm(model_from_scan * c.scan_from_model, c.model);
+  const double worst_mm = CornerMotionMm(model_from_scan * c.scan_from_model, c.model);
   state.counters["corner_um"] = 1000 * worst_mm;
   if (!(worst_mm <= within_mm)) {
     state.SkipWithError(

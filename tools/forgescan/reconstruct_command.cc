@@ -56,6 +56,7 @@ nlohmann::json ToJson(const CameraQuality& quality) {
           {"disagreement_rad", quality.trust.disagreement_rad},
           {"predicted_disagreement_rad", quality.trust.predicted_disagreement_rad},
           {"saturated_fraction", quality.trust.saturated_fraction},
+          {"uncut_reference_fraction", number(quality.trust.uncut_reference_fraction)},
           {"drift_dn", number(quality.trust.drift_dn)},
           {"drift_phase_rad", number(quality.trust.drift_phase_rad)},
           {"second_harmonic_ratio", number(quality.trust.second_harmonic_ratio)},

@@ -38,10 +38,15 @@ class Measurer {
     if (!value.ok()) return value.error();
     made_.value_mm = *value;
     made_.influence = sum_.Take();
+    made_.influence.extreme = extreme_;
     return made_;
   }
 
  private:
+  void Remark(const std::string& remark) {
+    made_.remark += made_.remark.empty() ? remark : fmt::format("; {}", remark);
+  }
+
   void Count(const FitQuality& quality) {
     made_.points += quality.used();
     made_.rejected += quality.rejected;
@@ -51,9 +56,14 @@ class Measurer {
   void Gather(WeighedPoints seen, const FaceCloud& cloud, const WeighedPoints& ideal, double unknowns) {
     seen.views = cloud.views;
     sum_.Add(seen, ideal, unknowns);
+    CountShell(seen.weights, seen.residuals);
+  }
+
+  // residuals: of the points from the face as a whole.
+  void CountShell(const std::vector<double>& weights, const std::vector<double>& residuals) {
     std::vector<double> used;
-    for (std::size_t i = 0; i < seen.residuals.size(); ++i) {
-      if (seen.weights[i] != 0) used.push_back(seen.residuals[i]);
+    for (std::size_t i = 0; i < residuals.size(); ++i) {
+      if (weights[i] != 0) used.push_back(residuals[i]);
     }
     if (!used.empty()) made_.d95_mm = std::max(made_.d95_mm, ThinnestShellMm(std::move(used)));
   }
@@ -78,7 +88,7 @@ class Measurer {
                     options_.min_arc_deg);
     if (fit.radius_constrained) return Fail(ErrorCode::kDegenerate, "radius constrained: {}", arc);
     if (fit.axis_constrained) {
-      made_.remark = fmt::format("radius constrained: the axis is held at the nominal one, as {}", arc);
+      Remark(fmt::format("radius constrained: the axis is held at the nominal one, as {}", arc));
     }
     ASSIGN_OR_RETURN(const FaceCloud seen, fits_.Seen(spec.faces));
     Count(fit.quality);
@@ -98,15 +108,17 @@ class Measurer {
     const ModelFace& nominal = fits_.Nominal(spec.faces.back());
     if (fit.axis.dot(nominal.direction) < 0) fit.axis = -fit.axis;
     TwoPointSizes found = MeasureTwoPoint(seen.points, fit, nominal.point, spec.sections_mm);
+    if (spec.definition != SizeDefinition::kTwoPointMean) {
+      extreme_ = ExpectedExtreme(found, fit.radius_mm, options_.influence.patch_cell_mm);
+    }
     auto& sizes = found.sizes;
     if (sizes.empty()) {
       return Fail(ErrorCode::kDegenerate, "in no section are opposite points of '{}' seen",
                   spec.faces.back());
     }
     if (found.seen_share < kWholeSection) {
-      made_.remark =
-          fmt::format("two-point sizes are seen in {:.0f} % of the directions of the sections only",
-                      100 * found.seen_share);
+      Remark(fmt::format("two-point sizes are seen in {:.0f} % of the directions of the sections only",
+                         100 * found.seen_share));
     }
     std::sort(sizes.begin(), sizes.end(), [](const auto& x, const auto& y) { return x.size_mm < y.size_mm; });
     if (spec.definition == SizeDefinition::kTwoPointMax) sizes.erase(sizes.begin(), sizes.end() - 1);
@@ -118,13 +130,21 @@ class Measurer {
           1.0 / static_cast<double>(size.first.size()) + 1.0 / static_cast<double>(size.second.size());
     }
     const auto count = static_cast<double>(sizes.size());
-    // A local size contains the form of its place: there is no form that it misses.
-    const WeighedPoints weighed = WeighTwoPoint(seen.points, fit, sizes);
-    Gather(weighed, seen, weighed, CylinderFit::kUnknowns);
+    GatherTwoPoint(sizes, fit, seen);
     made_.definition = fmt::format("{} (ISO 14405-1): two-point size in {} sections",
                                    SizeDefinitionName(spec.definition), spec.sections_mm.size());
     made_.uncertainty_mm = fit.quality.sigma_mm * std::sqrt(variance) / count;
     return sum / count;
+  }
+
+  // A local size contains the form of its place: there is no form that it misses.
+  void GatherTwoPoint(std::span<const TwoPointSize> sizes, const CylinderFit& fit, const FaceCloud& seen) {
+    WeighedPoints weighed = WeighTwoPoint(seen.points, fit, sizes);
+    weighed.views = seen.views;
+    sum_.Add(weighed, weighed, 0);
+    std::vector<double> residuals;
+    for (const Eigen::Vector3d& p : seen.points) residuals.push_back(fit.Residual(p));
+    CountShell(weighed.weights, residuals);
   }
 
   Result<double> Width(const DimensionSpec& spec) {
@@ -149,6 +169,7 @@ class Measurer {
   Result<double> Length(const DimensionSpec& spec) {
     ASSIGN_OR_RETURN(const DatumAxis axis, fits_.Axis(spec.datum));
     Count(axis.quality);
+    if (!axis.remark.empty()) Remark(axis.remark);
     made_.range_mm = 0;  // of the ends, not of the datum
     made_.definition = "along the datum axis, between the least-squares planes of the end faces";
     std::array<End, 2> ends;
@@ -161,8 +182,8 @@ class Measurer {
       if (end.error().code != ErrorCode::kUntrusted) return end.error();
       ASSIGN_OR_RETURN(ends[i], QuantileEnd(spec.faces[i], axis));
       made_.definition = "along the datum axis; quantiles of the points where an end is not plane";
-      made_.remark = fmt::format("end '{}' is not plane ({}): its {:.1f} % quantile along the axis counts",
-                                 spec.faces[i], end.error().message, 100 * kEndShare);
+      Remark(fmt::format("end '{}' is not plane ({}): its {:.1f} % quantile along the axis counts",
+                         spec.faces[i], end.error().message, 100 * kEndShare));
     }
     made_.uncertainty_mm = std::sqrt(ends[0].variance_mm2 + ends[1].variance_mm2);
     return std::abs(ends[0].at_mm - ends[1].at_mm);
@@ -214,6 +235,7 @@ class Measurer {
   const FaceFits& fits_;
   const DimensionOptions& options_;
   InfluenceSum sum_;
+  double extreme_ = 0;  // see Influence
   DimensionMeasurement made_;
 };
 

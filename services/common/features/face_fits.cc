@@ -69,6 +69,12 @@ Result<DatumAxis> FaceFits::Axis(const Names& names) const {
   for (const std::string& name : names) {
     ASSIGN_OR_RETURN(const CylinderFit fit, Cylinder({name}));
     Add(axis.quality, fit.quality);
+    if (fit.axis_constrained) {
+      axis.remark += fmt::format(
+          "{}datum '{}' is held at its nominal axis, as the points cover an arc of {:.0f} degrees, at least "
+          "{:.0f} are needed",
+          axis.remark.empty() ? "" : "; ", name, fit.arc_deg, options_.min_arc_deg);
+    }
     centers.push_back(fit.axis_point);
     axis.point = fit.axis_point;
     axis.direction = fit.axis;

@@ -17,6 +17,7 @@ struct DatumAxis {
   Eigen::Vector3d point = Eigen::Vector3d::Zero();
   Eigen::Vector3d direction = Eigen::Vector3d::Zero();
   FitQuality quality;  // points and rejected, over all cylinders
+  std::string remark;  // which cylinders were held at their nominal axis; empty if none
 };
 
 // Points of a face, or of several that are one cylinder.

@@ -22,6 +22,8 @@ struct Influence {
   double noise_mm = 0;  // standard uncertainty from errors of single points, of the size they scatter by
   double form_mm = 0;   // standard uncertainty from the form of what was not seen, or seen unevenly
   double patch = 0;     // mm per mm of error that a patch of one view shares, the patches being independent
+  double extreme = 0;  // expected largest of the readings the size was chosen from, in standard deviations of
+                       // one; 0: it was not chosen
 };
 
 }  // namespace forgescan

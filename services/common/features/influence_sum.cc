@@ -14,6 +14,11 @@ using Matrix5 = Eigen::Matrix<double, 5, 5>;
 
 constexpr double kFewInCell = 5;  // points: with fewer the mean of a cell says nothing of its form
 
+// Pieces of form do not lie as the cells do. A cell of a piece's size, laid anywhere over independent pieces,
+// overlaps four: its mean varies with 2/3 of their variance along each direction (a smooth form with a
+// Gaussian correlation of the same area: 0.68). The rest is within the cells.
+constexpr double kSeenInMeans = 4.0 / 9;
+
 using Key = std::array<int, 2>;
 
 Key CellOf(const Eigen::Vector2d& place, double size_mm) {
@@ -37,7 +42,7 @@ struct Cell {
   double count = 0, sum = 0, squares = 0;  // of the residuals of the points used
 };
 
-// Variance of the mean form of a cell, and of one point about it. Units: mm^2.
+// Variance of a piece of form, and of one point within a cell. Units: mm^2.
 struct Scatter {
   double form = 0, noise = 0;
 };
@@ -66,7 +71,7 @@ Scatter ScatterOf(const std::map<Key, Cell>& cells, double unknowns) {
     between += mean * mean - noise / cell.count;
   }
   // The fit itself took `unknowns` of what the cells could differ by.
-  return {std::max(0.0, between / (used - unknowns)), noise};
+  return {std::max(0.0, between / (used - unknowns)) / kSeenInMeans, noise};
 }
 
 }  // namespace

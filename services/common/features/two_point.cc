@@ -57,15 +57,28 @@ TwoPointSizes MeasureTwoPoint(std::span<const Eigen::Vector3d> points, const Cyl
   return result;
 }
 
+double ExpectedExtreme(const TwoPointSizes& found, double radius_mm, double patch_mm) {
+  const double pitch_mm = 2 * std::numbers::pi * radius_mm / kPatches;
+  const double own = static_cast<double>(found.sizes.size()) * std::min(1.0, pitch_mm / patch_mm);
+  return std::sqrt(2 * std::log(std::max(1.0, own)));
+}
+
 WeighedPoints WeighTwoPoint(std::span<const Eigen::Vector3d> points, const CylinderFit& cylinder,
                             std::span<const TwoPointSize> sizes) {
   WeighedPoints result;
   result.points = points;
   result.weights.assign(points.size(), 0);
+  result.residuals.assign(points.size(), 0);
   for (const TwoPointSize& size : sizes) {
     for (const auto* patch : {&size.first, &size.second}) {
-      const double share = 1.0 / static_cast<double>(patch->size() * sizes.size());
-      for (const std::size_t i : *patch) result.weights[i] += share;
+      const auto count = static_cast<double>(patch->size());
+      double mean = 0;
+      for (const std::size_t i : *patch) mean += cylinder.Residual(points[i]) / count;
+      for (const std::size_t i : *patch) {
+        result.weights[i] += 1 / (count * static_cast<double>(sizes.size()));
+        // Their squares are to add up to count times the variance.
+        result.residuals[i] = (cylinder.Residual(points[i]) - mean) * std::sqrt(count / (count - 1));
+      }
     }
   }
   const Eigen::Vector3d u = cylinder.axis.unitOrthogonal(), v = cylinder.axis.cross(u);
@@ -73,7 +86,6 @@ WeighedPoints WeighTwoPoint(std::span<const Eigen::Vector3d> points, const Cylin
     const Eigen::Vector3d arm = p - cylinder.axis_point;
     const Eigen::Vector3d radial = arm - arm.dot(cylinder.axis) * cylinder.axis;
     result.normals.push_back(radial.normalized());
-    result.residuals.push_back(cylinder.Residual(p));
     result.places.emplace_back(arm.dot(cylinder.axis),
                                std::atan2(v.dot(arm), u.dot(arm)) * cylinder.radius_mm);
   }

@@ -6,6 +6,8 @@
 #include <tuple>
 #include <utility>
 
+#include "services/common/geometry/nearest_on_triangle.h"
+
 namespace forgescan {
 namespace {
 
@@ -13,32 +15,6 @@ constexpr std::size_t kLeafSize = 4;
 // Two triangles that share the nearest edge give distances that differ by rounding only.
 constexpr float kTie = 1e-5F;
 constexpr float kOnEdge_mm = 1e-3F;  // ten times the rounding over a 2 m part
-
-// Nearest point to p of the triangle a + s ab + t ac (regions of the plane as in Ericson, Real-Time Collision
-// Detection, 5.1.5).
-Eigen::Vector3f NearestOnTriangle(const Eigen::Vector3f& p, const Eigen::Vector3f& a,
-                                  const Eigen::Vector3f& ab, const Eigen::Vector3f& ac) {
-  const Eigen::Vector3f ap = p - a;
-  const float d1 = ab.dot(ap), d2 = ac.dot(ap);
-  if (d1 <= 0 && d2 <= 0) return a;
-  const Eigen::Vector3f bp = ap - ab;
-  const float d3 = ab.dot(bp), d4 = ac.dot(bp);
-  if (d3 >= 0 && d4 <= d3) return a + ab;
-  const float vc = d1 * d4 - d3 * d2;
-  if (vc <= 0 && d1 >= 0 && d3 <= 0) return a + ab * (d1 / std::max(d1 - d3, 1e-30F));
-  const Eigen::Vector3f cp = ap - ac;
-  const float d5 = ab.dot(cp), d6 = ac.dot(cp);
-  if (d6 >= 0 && d5 <= d6) return a + ac;
-  const float vb = d5 * d2 - d1 * d6;
-  if (vb <= 0 && d2 >= 0 && d6 <= 0) return a + ac * (d2 / std::max(d2 - d6, 1e-30F));
-  const float va = d3 * d6 - d5 * d4;
-  if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) {
-    const float along = (d4 - d3) / std::max((d4 - d3) + (d5 - d6), 1e-30F);
-    return a + ab + (ac - ab) * along;
-  }
-  const float scale = 1.0F / (va + vb + vc);
-  return a + ab * (vb * scale) + ac * (vc * scale);
-}
 
 float SquaredDistanceToBox(const Eigen::Vector3f& p, const Eigen::Vector3f& low,
                            const Eigen::Vector3f& high) {

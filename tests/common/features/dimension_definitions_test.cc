@@ -108,6 +108,10 @@ TEST_F(DefinitionsTest, TwoPointSizesOfAnOvalCylinder) {
     EXPECT_EQ(lp.definition.find(name), 0U) << lp.definition;
     EXPECT_EQ(lp.reason, "");
     EXPECT_LT(lp.standard_uncertainty_mm, 0.05);
+    // 135 sizes, 3.1 mm apart around the section, and patches of 12 mm.
+    EXPECT_NEAR(lp.influence.extreme,
+                std::string(name) == "LP mean" ? 0 : std::sqrt(2 * std::log(135 * 3.09 / 12)), 0.001)
+        << name;
   }
 }
 
@@ -143,6 +147,26 @@ TEST_F(DefinitionsTest, AShortArcIsRefusedOrItsAxisIsHeld) {
   EXPECT_NEAR(held.influence.views[0].shift.z(), 2 * 3 * std::sqrt(3.0) / (2 * std::numbers::pi), 0.01);
   const auto whole = Measure(Oval(0, 0, 360), Diameter(""), hold);
   EXPECT_EQ(whole.reason, "");
+}
+
+// A datum that is held at the nominal axis is no measured one: the length says so.
+TEST_F(DefinitionsTest, ADatumHeldAtItsNominalAxisIsRemarked) {
+  PointCloud cloud = testing::ScanOf(*model_, {150'000, 0, 0.02, 15}), above;
+  DimensionOptions hold;
+  hold.short_arc = ShortArc::kHoldAxis;
+  EXPECT_EQ(Measure(cloud, kLength, hold).reason, "");
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    const Eigen::Vector3f& p = cloud.points[i];
+    if (p.x() > 815 && cloud.normals[i].z() < 0.5F && cloud.normals[i].x() < 0.9F) continue;
+    above.points.push_back(p);
+    above.normals.push_back(cloud.normals[i]);
+  }
+  const auto held = Measure(above, kLength, hold);
+  ASSERT_TRUE(held.measured_mm) << held.reason;
+  EXPECT_NEAR(*held.measured_mm, 1888.4, 0.01);  // mm: the nominal axis is the true one here
+  EXPECT_NE(held.reason.find("datum 'right_cylinder' is held at its nominal axis"), std::string::npos)
+      << held.reason;
+  EXPECT_EQ(held.reason.find("left_cylinder"), std::string::npos) << held.reason;
 }
 
 // The right end is a dome, 2.5 mm lower at its rim than in the middle.

@@ -73,6 +73,14 @@ Eigen::Vector3f Noisy(const Eigen::Vector3f& point, const Eigen::Vector3f& norma
   return point + normal * static_cast<float>(noise_mm * noise(random));
 }
 
+// A normal as it is fitted to noisy points.
+Eigen::Vector3f Tilted(const Eigen::Vector3f& normal, double noise_rad, std::mt19937_64& random) {
+  std::normal_distribution<float> noise(0, static_cast<float>(noise_rad));
+  const Eigen::Vector3f u = normal.unitOrthogonal(), v = normal.cross(u);
+  const float along_u = noise(random), along_v = noise(random);
+  return (normal + along_u * u + along_v * v).normalized();
+}
+
 void AddForeignPoint(PointCloud& cloud, double noise_mm, std::mt19937_64& random) {
   std::uniform_real_distribution<float> u(0, 1);
   Eigen::Vector3f normal = Eigen::Vector3f::UnitZ();
@@ -167,6 +175,9 @@ PointCloud ScanOf(const ModelBundle& model, const ScanOptions& options) {
     if (!options.from_all_sides && normal.z() < -0.7F) continue;
     cloud.points.push_back(Noisy(a + s * ab + r * ac, normal, options.noise_mm, random));
     cloud.normals.push_back(normal);
+  }
+  if (options.normal_noise_rad > 0) {
+    for (Eigen::Vector3f& normal : cloud.normals) normal = Tilted(normal, options.normal_noise_rad, random);
   }
   return cloud;
 }

@@ -42,10 +42,12 @@ struct ScanOptions {
   double foreign_share = 0.22;  // conveyor below the part and a clamp about the beam
   double noise_mm = 0.03;       // standard deviation along the normal
   std::uint64_t seed = 1;
-  bool from_all_sides = true;  // else nothing that faces down by more than 45 degrees
+  bool from_all_sides = true;   // else nothing that faces down by more than 45 degrees
+  double normal_noise_rad = 0;  // standard deviation of a normal, about each of two axes across it
 };
 
-// Frames: model. Points lie on the model's triangles but for noise; normals are those of the surface.
+// Frames: model. Points lie on the model's triangles but for noise; normals are those of the surface but for
+// theirs, which changes no point.
 PointCloud ScanOf(const ModelBundle& model, const ScanOptions& options);
 
 PointCloud Moved(const PointCloud& cloud, const Eigen::Isometry3d& to_from_cloud);

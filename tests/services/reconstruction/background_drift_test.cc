@@ -118,11 +118,18 @@ struct Trial {
   Status verdict;
 };
 
-Trial Try(const PatternSet& pattern, double drift_dn, double modulation_dn) {
+struct Cut {
+  int dn = 0;             // what the reference frame shows
+  double of_columns = 0;  // in this part of its columns
+};
+
+Trial Try(const PatternSet& pattern, double drift_dn, double modulation_dn, const Cut& cut = {}) {
   ReconstructionConfig config;
   config.noise = {.read_noise_dn = 0.6, .gain_dn = 0.005};
-  const auto frames = RenderColumns(
-      Sweep(), pattern, {.modulation_dn = modulation_dn, .noise = config.noise, .drift_dn = drift_dn});
+  auto frames = RenderColumns(Sweep(), pattern,
+                              {.modulation_dn = modulation_dn, .noise = config.noise, .drift_dn = drift_dn});
+  const int columns = static_cast<int>(cut.of_columns * frames.back().cols);
+  frames.back().colRange(0, columns).setTo(cut.dn);
   const auto decoder = FringeDecoder::Create(pattern, config);
   const auto view = decoder->Decode(frames);
   const auto figures = MeasureTrust(frames, *view, *decoder, config);
@@ -151,6 +158,26 @@ TEST(BackgroundDrift, IsMeasuredInEveryViewAndRefusedWhereTheBackgroundIsShared)
     const Status verdict = Try(pattern, 1, 50).verdict;
     EXPECT_TRUE(verdict.ok()) << verdict.error().message;
   }
+}
+
+// A drift that is large enough to be refused must not pass because nothing shows it.
+TEST(BackgroundDrift, IsNotJudgedByAReferenceThatIsCutOff) {
+  const PatternSet shared = StationPattern(Background::kShared);
+  for (const Cut& cut : {Cut{255, 1}, Cut{0, 1}, Cut{255, 0.6}, Cut{0, 0.6}}) {
+    SCOPED_TRACE(cut.dn);
+    for (const double drift_dn : {0.0, 1.0}) {
+      const Trial trial = Try(shared, drift_dn, 50, cut);
+      ASSERT_FALSE(trial.verdict.ok());
+      EXPECT_EQ(trial.verdict.error().code, ErrorCode::kUntrusted);
+      EXPECT_THAT(trial.verdict.error().message,
+                  HasSubstr("the reference frame of the left camera is cut off"));
+      EXPECT_NEAR(trial.figures.uncut_reference_fraction.value(), 1 - cut.of_columns, 0.02);  // of samples
+    }
+    EXPECT_TRUE(Try(StationPattern(Background::kOwn), 0, 50, cut).verdict.ok());
+  }
+  const Trial part = Try(shared, 0, 50, {255, 0.4});
+  EXPECT_TRUE(part.verdict.ok()) << part.verdict.error().message;
+  EXPECT_NEAR(part.figures.drift_dn.value(), 0, 0.05);  // DN: what is left shows it
 }
 
 }  // namespace

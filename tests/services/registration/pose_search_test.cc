@@ -110,6 +110,72 @@ TEST_F(PoseSearchTest, RefusesWhatCannotBeToldApart) {
   EXPECT_NE(result.error().message.find("ambiguous"), std::string::npos) << result.error().message;
 }
 
+Result<ModelBundle> BarOf(const std::vector<Eigen::Vector2f>& outline) {
+  constexpr float kHalfWidthMm = 20;
+  TriangleMesh mesh;
+  const auto count = static_cast<std::uint32_t>(outline.size());
+  for (const float y : {-kHalfWidthMm, kHalfWidthMm}) {
+    for (const auto& p : outline) mesh.vertices.emplace_back(p.x(), y, p.y());
+  }
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const std::uint32_t next = (i + 1) % count;
+    mesh.triangles.push_back({i, next, next + count});
+    mesh.triangles.push_back({i, next + count, i + count});
+  }
+  // The sides, in quads from the outline's lower half to its upper half, which have as many corners.
+  for (std::uint32_t i = 0; i + 1 < count / 2; ++i) {
+    const std::uint32_t a = i, b = i + 1, c = count - 2 - i, d = count - 1 - i;
+    for (const TriangleCorners& t : {TriangleCorners{a, c, b}, {a, d, c}}) {
+      mesh.triangles.push_back(t);
+      mesh.triangles.push_back({t[0] + count, t[2] + count, t[1] + count});
+    }
+  }
+  return ModelFromMesh(mesh, 2);
+}
+
+// A bar with a narrow groove below and none above, seen without its ends. Upside down it fits about as well,
+// but can slide: that pose is refused by itself, and all the same tells against the other.
+TEST_F(PoseSearchTest, ARefusedPoseIsStillARival) {
+  const auto bar = BarOf({{-150, -15},
+                          {-1.5F, -15},
+                          {-1.5F, -12},
+                          {1.5F, -12},
+                          {1.5F, -15},
+                          {150, -15},
+                          {150, 15},
+                          {1.5F, 15},
+                          {1, 15},
+                          {-1, 15},
+                          {-1.5F, 15},
+                          {-150, 15}});
+  ASSERT_TRUE(bar.ok()) << bar.error().message;
+  const auto model = RegistrationModel::Build(*bar);
+  ASSERT_TRUE(model.ok()) << model.error().message;
+  const PointCloud all = ScanOf(*bar, {60'000, 0, 0.1, 6});
+  PointCloud middle;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (std::abs(all.points[i].x()) > 70) continue;
+    middle.points.push_back(all.points[i]);
+    middle.normals.push_back(all.normals[i]);
+  }
+  EXPECT_TRUE(RegisterScan(middle, *model, Eigen::Isometry3d::Identity(), {}).ok());
+  const auto result = SearchPose(Moved(middle, AnyPose(6)), *model, {});
+  ASSERT_FALSE(result.ok());
+  EXPECT_NE(result.error().message.find("ambiguous"), std::string::npos) << result.error().message;
+}
+
+// A half turn that maps the part onto itself is no rival, however noisy the poses are.
+TEST_F(PoseSearchTest, ASymmetricPartIsNotRefused) {
+  const auto bar = BarOf({{-60, -25}, {60, -25}, {60, 25}, {-60, 25}});
+  ASSERT_TRUE(bar.ok()) << bar.error().message;
+  const auto model = RegistrationModel::Build(*bar);
+  ASSERT_TRUE(model.ok()) << model.error().message;
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+    const auto result = SearchPose(Moved(ScanOf(*bar, {20'000, 0, 0.1, seed}), AnyPose(seed)), *model, {});
+    EXPECT_TRUE(result.ok()) << result.error().message;
+  }
+}
+
 TEST_F(PoseSearchTest, RefusesForeignPointsOnlyAndTooFewPoints) {
   EXPECT_FALSE(SearchPose(ScanOf(*bundle_, {20'000, 1, 0.03, 4}), *model_, {}).ok());
   EXPECT_EQ(SearchPose({}, *model_, {}).error().code, ErrorCode::kDegenerate);

@@ -20,19 +20,6 @@ using testing::ScanOptions;
 
 constexpr double kThreeDegrees = 0.0524;
 
-// Farthest that `error` moves a corner of the model's box, mm.
-double WorstCornerMm(const Eigen::Isometry3d& error, const RegistrationModel& model) {
-  double worst = 0;
-  for (int corner = 0; corner < 8; ++corner) {
-    Eigen::Vector3d p = model.box_low();
-    for (int axis = 0; axis < 3; ++axis) {
-      if ((corner >> axis & 1) != 0) p[axis] = model.box_high()[axis];
-    }
-    worst = std::max(worst, (error * p - p).norm());
-  }
-  return worst;
-}
-
 class RegistrationTest : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
@@ -69,7 +56,7 @@ TEST_F(RegistrationTest, FindsTheAxleAmongForeignPoints) {
     const PointCloud scan = Moved(ScanOf(*bundle_, {40'000, foreign_share, 0.03, seed}), scan_from_model);
     const auto result = RegisterScan(scan, *model_, Eigen::Isometry3d::Identity(), {});
     ASSERT_TRUE(result.ok()) << "seed " << seed << ": " << result.error().message;
-    const double worst = WorstCornerMm(result->model_from_scan * scan_from_model, *model_);
+    const double worst = CornerMotionMm(result->model_from_scan * scan_from_model, *model_);
     EXPECT_LT(worst, 0.02) << "seed " << seed;
     RecordProperty("worst_corner_um_" + std::to_string(seed), static_cast<int>(1000 * worst));
     EXPECT_NEAR(result->rms_mm, 0.03, 0.006);  // the noise; the biweight takes a little off it
@@ -82,7 +69,7 @@ TEST_F(RegistrationTest, WorksWithoutNormalsAndWithThePartSeenFromAbove) {
   scan.normals.clear();
   const auto result = RegisterScan(scan, *model_, Eigen::Isometry3d::Identity(), {});
   ASSERT_TRUE(result.ok()) << result.error().message;
-  EXPECT_LT(WorstCornerMm(result->model_from_scan * scan_from_model, *model_), 0.02);  // mm, as above
+  EXPECT_LT(CornerMotionMm(result->model_from_scan * scan_from_model, *model_), 0.02);  // mm, as above
 }
 
 TEST_F(RegistrationTest, GivesEqualBytesForAnyNumberOfThreads) {
@@ -111,7 +98,7 @@ TEST_F(RegistrationTest, PointsThatAreNotFiniteDoNotMatter) {
     scan.normals[i].z() = std::numeric_limits<float>::infinity();
   const auto result = RegisterScan(scan, *model_, Eigen::Isometry3d::Identity(), {});
   ASSERT_TRUE(result.ok()) << result.error().message;
-  EXPECT_LT(WorstCornerMm(result->model_from_scan * scan_from_model, *model_), 0.02);  // mm, as above
+  EXPECT_LT(CornerMotionMm(result->model_from_scan * scan_from_model, *model_), 0.02);  // mm, as above
   for (const std::uint32_t i : FindPartPoints(scan, *model_, result->model_from_scan, {})) {
     ASSERT_TRUE(scan.points[i].allFinite());
   }
@@ -207,7 +194,7 @@ TEST_F(RegistrationTest, RefusesAStartThatIsFarOff) {
   const PointCloud scan = Moved(ScanOf(*bundle_, {20'000, 0, 0.03, 6}), scan_from_model);
   const auto result = RegisterScan(scan, *model_, Eigen::Isometry3d::Identity(), {});
   if (result.ok())
-    ADD_FAILURE() << "a pose off by " << WorstCornerMm(result->model_from_scan * scan_from_model, *model_);
+    ADD_FAILURE() << "a pose off by " << CornerMotionMm(result->model_from_scan * scan_from_model, *model_);
 }
 
 TEST_F(RegistrationTest, NamesWhatIsWrongWithTheInput) {

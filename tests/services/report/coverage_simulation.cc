@@ -147,7 +147,8 @@ class Simulation {
 
   Result<Outcome> Measure(int number) const {
     Draw draw(options_.seed * 1'000'003 + static_cast<std::uint64_t>(number));
-    const Part part = Part::Make(draw, options_, influence_.form_cell_mm / kCellPerLength);
+    const Part part =
+        Part::Make(draw, options_, options_.form_lengths * influence_.form_cell_mm / kCellPerLength);
     ASSIGN_OR_RETURN(const auto truth, evaluator_.Evaluate(Exact(part)));
     ASSIGN_OR_RETURN(const auto measured, evaluator_.Evaluate(Scan(part, draw)));
     Outcome outcome;
@@ -216,8 +217,8 @@ class Simulation {
     const double height_mm = draw.Normal(budget.surface_mm);
     PointCloud cloud;
     for (std::size_t v = 0; v < views_.size(); ++v) {
-      const ViewError error =
-          ViewError::Make(draw, budget, scale, warmth_k, influence_.patch_cell_mm / kCellPerLength);
+      const ViewError error = ViewError::Make(
+          draw, budget, scale, warmth_k, options_.patch_lengths * influence_.patch_cell_mm / kCellPerLength);
       for (const SurfacePoint& at : views_[v].points) {
         const double off_mm =
             at.face < 0 ? 0 : height_mm + draw.Normal(options_.noise_mm) + error.patches.At(at.point);

@@ -18,6 +18,8 @@ struct CoverageOptions {
   std::size_t surface_points = 100'000;  // over the whole part, from which each view sees its share
   double noise_mm = 0.03;                // of single points
   double form_mm = 0.05;                 // of the forged faces, standard deviation
+  // Correlation lengths of what is drawn, in those the evaluation assumes (InfluenceOptions).
+  double patch_lengths = 1, form_lengths = 1;
 };
 
 // Of one dimension over all parts. Units: mm.

@@ -135,6 +135,7 @@ TEST(Uncertainty, FollowsTheInfluenceOfTheViews) {
   EXPECT_EQ(TermMm(terms, "scatter of the points"), 0.001);
   EXPECT_EQ(TermMm(terms, "form of the faces"), 0.002);
   EXPECT_NEAR(TermMm(terms, "patches of a view"), 0.005, kRounding);
+  EXPECT_EQ(TermMm(terms, "extreme of many readings"), 0);
   EXPECT_NEAR(TermMm(terms, "view matrices"), std::sqrt(2.0) * std::hypot(0.03, 0.03), kRounding);
   EXPECT_NEAR(TermMm(terms, "robot"), std::sqrt(2.0) * 0.004, kRounding);
   EXPECT_NEAR(TermMm(terms, "refraction"), std::sqrt(2.0) * 0.02, kRounding);
@@ -142,6 +143,18 @@ TEST(Uncertainty, FollowsTheInfluenceOfTheViews) {
   EXPECT_NEAR(TermMm(terms, "scale of the scanner"), 0.02, kRounding);
   EXPECT_NEAR(TermMm(terms, "temperature of the part"), 0.01, kRounding);
   EXPECT_NEAR(TermMm(terms, "temperature between views"), 50 * 2e-5 * std::sqrt(2.0), kRounding);
+}
+
+// The largest of readings with 0.003 and 0.004 mm of their own lies up to three of their sum of squares too
+// far out.
+TEST(Uncertainty, CountsThatASizeWasChosenAsAnExtreme) {
+  Influence influence;
+  influence.views.resize(1);
+  influence.noise_mm = 0.003;
+  influence.patch = 0.4;
+  influence.extreme = 3;
+  const auto terms = UncertaintyTerms({.patch_mm = 0.01}, influence, 100.0, 0.5);
+  EXPECT_NEAR(TermMm(terms, "extreme of many readings"), std::sqrt(3.0) * 0.005, 1e-12);  // mm, rounding
 }
 
 TEST(Uncertainty, DefaultsOfTheAxleWithoutKnowledgeOfItsViews) {

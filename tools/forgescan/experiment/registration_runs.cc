@@ -40,7 +40,7 @@ std::vector<double> RunOurs(const Workpiece& workpiece, const ScanRequest& reque
   icp.threads = 1;  // the runs are spread over threads instead
   return RunAll(workpiece, request, options, [&](const StartCase& start) {
     const auto result = RegisterScan(start.scan, workpiece.model, Eigen::Isometry3d::Identity(), icp);
-    return result.ok() ? WorstCornerMm(result->model_from_scan * start.scan_from_model, workpiece.model)
+    return result.ok() ? CornerMotionMm(result->model_from_scan * start.scan_from_model, workpiece.model)
                        : kRefused;
   });
 }
@@ -52,7 +52,7 @@ std::vector<double> RunTrimmed(const Workpiece& workpiece, const ScanRequest& re
   return RunAll(workpiece, request, options, [&](const StartCase& start) {
     const auto result =
         AlignTrimmed(start.scan.points, workpiece.model.surface(), Eigen::Isometry3d::Identity(), trimmed);
-    return WorstCornerMm(result.model_from_scan * start.scan_from_model, workpiece.model);
+    return CornerMotionMm(result.model_from_scan * start.scan_from_model, workpiece.model);
   });
 }
 

@@ -170,16 +170,4 @@ Eigen::Isometry3d RandomOffset(const Eigen::Vector3d& center, double angle_rad, 
          Eigen::Translation3d(-center);
 }
 
-double WorstCornerMm(const Eigen::Isometry3d& error, const RegistrationModel& model) {
-  double worst = 0;
-  for (int corner = 0; corner < 8; ++corner) {
-    Eigen::Vector3d p = model.box_low();
-    for (int axis = 0; axis < 3; ++axis) {
-      if ((corner >> axis & 1) != 0) p[axis] = model.box_high()[axis];
-    }
-    worst = std::max(worst, (error * p - p).norm());
-  }
-  return worst;
-}
-
 }  // namespace forgescan

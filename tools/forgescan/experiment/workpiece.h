@@ -46,7 +46,4 @@ PointCloud MovedCloud(const PointCloud& cloud, const Eigen::Isometry3d& to_from_
 Eigen::Isometry3d RandomOffset(const Eigen::Vector3d& center, double angle_rad, double shift_mm,
                                RandomStream& random);
 
-// Farthest that `error` moves a corner of the model's bounding box, mm.
-double WorstCornerMm(const Eigen::Isometry3d& error, const RegistrationModel& model);
-
 }  // namespace forgescan
