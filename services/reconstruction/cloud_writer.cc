@@ -7,6 +7,8 @@
 #include <cstring>
 #include <utility>
 
+#include "services/common/huge_pages.h"
+
 namespace forgescan {
 namespace {
 
@@ -15,6 +17,9 @@ constexpr std::size_t kLine = 64;  // bytes the processor moves at a time
 // Whole lines go past the cache.
 template <typename T>
 void Stream(std::span<const T> values, T* target) {
+  if (values.empty()) {
+    return;
+  }
   const auto* from = reinterpret_cast<const char*>(values.data());
   auto* to = reinterpret_cast<char*>(target);
   std::size_t left = values.size_bytes();
@@ -31,6 +36,9 @@ void Stream(std::span<const T> values, T* target) {
 }
 
 void Resize(std::size_t size, PointCloud& cloud) {
+  ReserveHuge(size, cloud.points);
+  ReserveHuge(size, cloud.normals);
+  ReserveHuge(size, cloud.sigma_mm);
   cloud.points.resize(size);
   cloud.normals.resize(size);
   cloud.sigma_mm.resize(size);
