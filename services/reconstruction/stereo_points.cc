@@ -139,8 +139,9 @@ Result<StereoPoints> ComputeStereoPoints(const DecodedView& left, const DecodedV
   const StereoTask task = {.kernel = *StereoKernels().front(),
                            .left = ViewOf(left, left_slope, config),
                            .right = ViewOf(right, right_slope, config),
-                           .left_slopes = LimitsOf(left_slope, config),
-                           .right_slopes = LimitsOf(right_slope, config),
+                           .limits = {.left = LimitsOf(left_slope, config),
+                                      .right = LimitsOf(right_slope, config),
+                                      .max_left_right_px = static_cast<float>(config.max_left_right_px)},
                            .rig = rig,
                            .config = config,
                            .sample_step = std::max(width * height / kSampled, 1)};

@@ -65,10 +65,15 @@ class Strip {
     const StereoKernel& kernel = task_.kernel;
     kernel.sample(task_.left, task_.rig.left_lines.Row(row), left);
     kernel.sample(task_.right, task_.rig.right_lines.Row(row), right_.row());
-    kernel.prepare(blocks_, task_.left_slopes, left);
-    kernel.prepare(blocks_, task_.right_slopes, right_.row());
-    return kernel.match(blocks_, left, right_.row(), static_cast<float>(task_.config.max_left_right_px),
-                        hints_.data(), Disparity(row));
+    kernel.prepare(blocks_, task_.limits.left, left);
+    kernel.prepare(blocks_, task_.limits.right, right_.row());
+    const MatchTask match = {.left = &left,
+                             .right = &right_.row(),
+                             .limits = task_.limits,
+                             .blocks = blocks_,
+                             .next = {&task_.right, task_.rig.right_lines.Row(row)},
+                             .hints = hints_.data()};
+    return kernel.match(match, Disparity(row));
   }
 
   void Count(const MatchCounts& counts) {
@@ -131,7 +136,8 @@ class Strip {
                               .below = lines.Row(std::min(row + 1, height - 1)),
                               .sums = scratch_[3],
                               .moments = scratch_[4],
-                              .blocks = blocks_},
+                              .blocks = blocks_,
+                              .next = {&task_.left, lines.Row(std::min(row + radius_, height - 1))}},
                              Geometry(row), points);
     Append(row, points);
   }
@@ -165,7 +171,7 @@ class Strip {
   int radius_, window_, blocks_;
   RowArrays kept_, scratch_;
   PreparedRow left_, right_;
-  std::vector<int> hints_;
+  std::vector<MatchHint> hints_;
   std::vector<float> points_;
   CloudWriter cloud_;
   std::optional<ProjectorModel> projector_;
