@@ -10,6 +10,8 @@
 #include <optional>
 #include <span>
 
+#include "services/common/huge_pages.h"
+
 namespace forgescan {
 namespace {
 
@@ -66,7 +68,7 @@ struct Frame {
   double first_px;  // of its columns, from the principal point
 };
 
-// The raw rows below which the line runs inside of the frame, by the arithmetic of the kernels.
+// The raw rows below which the line runs inside of the frame; its own rows count from the first of them.
 void SetRows(int lanes, const Frame& frame, EpipolarBlock& block) {
   int low = std::numeric_limits<int>::max(), high = -1;
   for (int i = 0; i < lanes; ++i) {
@@ -81,6 +83,7 @@ void SetRows(int lanes, const Frame& frame, EpipolarBlock& block) {
     }
   }
   block.first_row = static_cast<std::uint16_t>(high < 0 ? 0 : low);
+  block.row[0] -= static_cast<float>(block.first_row);
   block.row_count = static_cast<std::uint16_t>(high < 0 ? 0 : high - low + 1);
 }
 
@@ -127,8 +130,10 @@ Result<EpipolarTable> EpipolarTable::Build(const CameraIntrinsics& camera, const
   EpipolarTable table;
   table.size_ = size;
   table.blocks_a_row_ = (size.width_px + kStereoLanes - 1) / kStereoLanes;
-  table.blocks_.resize(static_cast<std::size_t>(table.blocks_a_row_) *
-                       static_cast<std::size_t>(size.height_px));
+  const std::size_t count =
+      static_cast<std::size_t>(table.blocks_a_row_) * static_cast<std::size_t>(size.height_px);
+  ReserveHuge(count, table.blocks_);
+  table.blocks_.resize(count);
   for (int row = 0; row < size.height_px; ++row) {
     if (row % kStrip == 0) {
       cv::Mat shifted = projection.clone();

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "services/common/parallel_rows.h"
+#include "services/reconstruction/cloud_writer.h"
 #include "services/reconstruction/histogram_median.h"
 #include "services/reconstruction/stereo_strip.h"
 
@@ -100,34 +101,23 @@ void Add(const StereoCounts& other, StereoCounts& sum) {
   sum.points += other.points;
 }
 
-template <typename T>
-void Append(const std::vector<T>& from, std::vector<T>& to) {
-  to.insert(to.end(), from.begin(), from.end());
-}
-
 StereoPoints Join(std::vector<StripResult> strips) {
   StereoPoints joined;
-  std::size_t total = 0;
-  for (const StripResult& strip : strips) {
-    total += strip.cloud_in_camera.size();
-  }
-  PointCloud& cloud = joined.cloud_in_camera = std::move(strips[0].cloud_in_camera);
-  cloud.points.reserve(total);
-  cloud.normals.reserve(total);
-  cloud.sigma_mm.reserve(total);
   HistogramMedian& residuals = strips[0].projector_residuals_px;
   std::vector<LitPoint>& sample = strips[0].sample;
+  const std::size_t first = strips[0].cloud_in_camera.size();
+  CloudWriter cloud(std::move(strips[0].cloud_in_camera), first);
   for (std::size_t i = 0; i < strips.size(); ++i) {
     Add(strips[i].count, joined.count);
     if (i > 0) {
-      Append(strips[i].cloud_in_camera.points, cloud.points);
-      Append(strips[i].cloud_in_camera.normals, cloud.normals);
-      Append(strips[i].cloud_in_camera.sigma_mm, cloud.sigma_mm);
-      Append(strips[i].sample, sample);
+      const PointCloud& part = strips[i].cloud_in_camera;
+      cloud.Append({part.points, part.normals, part.sigma_mm});
+      sample.insert(sample.end(), strips[i].sample.begin(), strips[i].sample.end());
       residuals.Add(strips[i].projector_residuals_px);
       joined.spare.push_back(std::move(strips[i].cloud_in_camera));
     }
   }
+  joined.cloud_in_camera = std::move(cloud).Finish();
   joined.sample = Thinned(sample);
   if (residuals.total() > 0) {
     joined.median_projector_residual_px = residuals.Median();
@@ -149,8 +139,9 @@ Result<StereoPoints> ComputeStereoPoints(const DecodedView& left, const DecodedV
   const StereoTask task = {.kernel = *StereoKernels().front(),
                            .left = ViewOf(left, left_slope, config),
                            .right = ViewOf(right, right_slope, config),
-                           .left_slopes = LimitsOf(left_slope, config),
-                           .right_slopes = LimitsOf(right_slope, config),
+                           .limits = {.left = LimitsOf(left_slope, config),
+                                      .right = LimitsOf(right_slope, config),
+                                      .max_left_right_px = static_cast<float>(config.max_left_right_px)},
                            .rig = rig,
                            .config = config,
                            .sample_step = std::max(width * height / kSampled, 1)};

@@ -5,6 +5,7 @@
 #include <numbers>
 #include <optional>
 
+#include "services/reconstruction/cloud_writer.h"
 #include "services/reconstruction/stereo/row_arrays.h"
 
 namespace forgescan {
@@ -22,15 +23,11 @@ class Strip {
         left_(blocks_, nullptr, nullptr, nullptr),
         right_(blocks_, scratch_[0], scratch_[1], scratch_[2]),
         hints_(static_cast<std::size_t>(blocks_)),
-        points_(static_cast<std::size_t>((kPointFloats * (blocks_ + 1)) * kStereoLanes)) {
+        points_(static_cast<std::size_t>((kPointFloats * (blocks_ + 1)) * kStereoLanes)),
+        cloud_(std::move(cloud)) {
     if (task.rig.projector) {
       projector_ = MakeProjectorModel(*task.rig.projector, task.config);
     }
-    result_.cloud_in_camera = std::move(cloud);
-    result_.cloud_in_camera.points.clear();
-    result_.cloud_in_camera.normals.clear();
-    result_.cloud_in_camera.sigma_mm.clear();
-    result_.cloud_in_camera.view.clear();
   }
 
   StripResult Run(int begin, int end) {
@@ -47,6 +44,7 @@ class Strip {
     for (int row = std::max(height - radius_, begin); row < end; ++row) {
       AddPoints(row);
     }
+    result_.cloud_in_camera = std::move(cloud_).Finish();
     return std::move(result_);
   }
 
@@ -67,10 +65,15 @@ class Strip {
     const StereoKernel& kernel = task_.kernel;
     kernel.sample(task_.left, task_.rig.left_lines.Row(row), left);
     kernel.sample(task_.right, task_.rig.right_lines.Row(row), right_.row());
-    kernel.prepare(blocks_, task_.left_slopes, left);
-    kernel.prepare(blocks_, task_.right_slopes, right_.row());
-    return kernel.match(blocks_, left, right_.row(), static_cast<float>(task_.config.max_left_right_px),
-                        hints_.data(), Disparity(row));
+    kernel.prepare(blocks_, task_.limits.left, left);
+    kernel.prepare(blocks_, task_.limits.right, right_.row());
+    const MatchTask match = {.left = &left,
+                             .right = &right_.row(),
+                             .limits = task_.limits,
+                             .blocks = blocks_,
+                             .next = {&task_.right, task_.rig.right_lines.Row(row)},
+                             .hints = hints_.data()};
+    return kernel.match(match, Disparity(row));
   }
 
   void Count(const MatchCounts& counts) {
@@ -133,21 +136,22 @@ class Strip {
                               .below = lines.Row(std::min(row + 1, height - 1)),
                               .sums = scratch_[3],
                               .moments = scratch_[4],
-                              .blocks = blocks_},
+                              .blocks = blocks_,
+                              .next = {&task_.left, lines.Row(std::min(row + radius_, height - 1))}},
                              Geometry(row), points);
     Append(row, points);
   }
 
   void Append(int row, const PointRow& points) {
-    PointCloud& cloud = result_.cloud_in_camera;
     const auto* const p = reinterpret_cast<const Eigen::Vector3f*>(points.points_mm);
     const auto* const n = reinterpret_cast<const Eigen::Vector3f*>(points.normals);
-    if (task_.config.keep_every_nth_point == 1) {
-      cloud.points.insert(cloud.points.end(), p, p + points.count);
-      cloud.normals.insert(cloud.normals.end(), n, n + points.count);
-      cloud.sigma_mm.insert(cloud.sigma_mm.end(), points.sigma_mm, points.sigma_mm + points.count);
+    const auto count = static_cast<std::size_t>(points.count);
+    const PointSpans spans = {{p, count}, {n, count}, {points.sigma_mm, count}};
+    const int step = task_.config.keep_every_nth_point;
+    if (step == 1) {
+      cloud_.Append(spans);
     } else {
-      AppendThinned(row, points);
+      cloud_.AppendThinned(spans, static_cast<std::size_t>(5 * row % step), static_cast<std::size_t>(step));
     }
     for (int i = 37 * row % task_.sample_step; i < points.count; i += task_.sample_step) {
       result_.sample.push_back({p[i], task_.left.sign * points.coordinate_px[i]});
@@ -163,30 +167,13 @@ class Strip {
     }
   }
 
-  void AppendThinned(int row, const PointRow& points) {
-    PointCloud& cloud = result_.cloud_in_camera;
-    const int step = task_.config.keep_every_nth_point;
-    const int first = 5 * row % step;
-    const int kept = points.count > first ? (points.count - first - 1) / step + 1 : 0;
-    const std::size_t size = cloud.points.size();
-    cloud.points.resize(size + static_cast<std::size_t>(kept));
-    cloud.normals.resize(cloud.points.size());
-    cloud.sigma_mm.resize(cloud.points.size());
-    for (int i = 0; i < kept; ++i) {
-      const int from = first + i * step;
-      const std::size_t to = size + static_cast<std::size_t>(i);
-      cloud.points[to] = Eigen::Map<const Eigen::Vector3f>(points.points_mm + 3 * from);
-      cloud.normals[to] = Eigen::Map<const Eigen::Vector3f>(points.normals + 3 * from);
-      cloud.sigma_mm[to] = points.sigma_mm[from];
-    }
-  }
-
   const StereoTask& task_;
   int radius_, window_, blocks_;
   RowArrays kept_, scratch_;
   PreparedRow left_, right_;
-  std::vector<int> hints_;
+  std::vector<MatchHint> hints_;
   std::vector<float> points_;
+  CloudWriter cloud_;
   std::optional<ProjectorModel> projector_;
   StripResult result_;
 };

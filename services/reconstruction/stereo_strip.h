@@ -18,8 +18,7 @@ struct StereoTask {
   const StereoKernel& kernel;
   RawView left;
   RawView right;
-  SlopeLimits left_slopes;
-  SlopeLimits right_slopes;
+  MatchLimits limits;
   const StereoRig& rig;
   const ReconstructionConfig& config;
   int sample_step = 1;  // of a row's points

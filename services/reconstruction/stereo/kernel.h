@@ -13,8 +13,8 @@ constexpr int kMaxSegments = 64;    // of a row; more is no surface
 constexpr int kSegmentMargin = 64;  // floats behind each segment's ranks
 
 // Where the epipolar line of one rectified row runs through 16 columns of a raw image, at column 16 block +
-// i: raw row = row[0] + i (row[1] + i row[2]), rectified column likewise, measured from the principal point.
-// px.
+// i: raw row = first_row + row[0] + i (row[1] + i row[2]), rectified column = column[0] + ..., measured from
+// the principal point. px.
 struct EpipolarBlock {
   float row[3];
   float column[3];
@@ -45,14 +45,11 @@ struct RowSegment {
 struct StereoRow {
   float* raw_px;         // coordinate between two raw rows; NaN: none
   float* coordinate_px;  // the same, smoothed along the row
-  float* variance_px2;
-  float* column_px;     // rectified, from the principal point
-  float* inverse_step;  // 1 / (coordinate[x + 1] - coordinate[x]); NaN unless x and x + 1 are one surface
-  float* pair_variance_px2;  // the larger one of x and x + 1
-  float* ranks;              // coordinates of the segments, gaps filled from the left, +inf behind each
-  std::uint16_t* pair_bits;  // of each block: x and x + 1 are one surface
-  RowSegment* segments;      // kMaxSegments
-  int segment_count;         // kMaxSegments + 1: too many
+  float* variance_px2;   // once prepared, NaN where neither neighbour is of the same surface
+  float* column_px;      // rectified, from the principal point
+  float* ranks;          // coordinates of the segments, gaps filled from the left, +inf behind each
+  RowSegment* segments;  // kMaxSegments
+  int segment_count;     // kMaxSegments + 1: too many
 };
 
 struct SlopeLimits {
@@ -60,14 +57,41 @@ struct SlopeLimits {
   float max_off_px;  // of a pixel from the parabola through it and its neighbours
 };
 
-struct MatchCounts {
-  long candidates = 0, no_partner = 0, ambiguous = 0, left_right = 0;
+struct MatchLimits {
+  SlopeLimits left, right;
+  float max_left_right_px;  // how far there and back may be from where it began
+};
+
+// The line of a view whose surroundings the next rows will read.
+struct FetchTask {
+  const RawView* view;
+  const EpipolarBlock* line;
+};
+
+// Where the partners of a block's pixels were in the row above: at begin + index of the row's ranks. Any
+// numbers will do.
+struct MatchHint {
+  int begin;
+  std::int32_t index[kStereoLanes];
 };
 
 // Disparity of the left pixels of a row, from the principal points. NaN: none.
 struct DisparityRow {
   float* disparity_px;
   float* variance_px2;
+};
+
+// hints: one a block. next: of the right view.
+struct MatchTask {
+  const StereoRow *left, *right;
+  MatchLimits limits;
+  int blocks;
+  FetchTask next;
+  MatchHint* hints;
+};
+
+struct MatchCounts {
+  long candidates = 0, no_partner = 0, ambiguous = 0, left_right = 0;
 };
 
 // Pose from the rectified left camera, OpenCV's lens model, and how far the column a point shows may be from
@@ -102,7 +126,7 @@ struct PointRow {
 };
 
 // rows: disparities of the 2 radius + 1 rows around, NaN rows outside of the image. above, here, below:
-// blocks of the epipolar table. sums, moments: scratch rows with margins.
+// blocks of the epipolar table. sums, moments: scratch rows with margins. next: of the left view.
 struct PointTask {
   const float* const* rows;
   const StereoRow* left;
@@ -110,15 +134,14 @@ struct PointTask {
   const EpipolarBlock *above, *here, *below;
   float *sums, *moments;
   int blocks;
+  FetchTask next;
 };
 
 struct StereoKernel {
   const char* name;
   void (*sample)(const RawView& view, const EpipolarBlock* blocks, const StereoRow& row);
-  void (*prepare)(int blocks, SlopeLimits limits, StereoRow& row);
-  // hints: one a block, where the partner was in the row above; any numbers will do.
-  MatchCounts (*match)(int blocks, const StereoRow& left, const StereoRow& right, float max_left_right_px,
-                       int* hints, const DisparityRow& disparity);
+  void (*prepare)(int blocks, const SlopeLimits& limits, StereoRow& row);
+  MatchCounts (*match)(const MatchTask& task, const DisparityRow& disparity);
   void (*triangulate)(const PointTask& task, const PointGeometry& geometry, PointRow& points);
 };
 

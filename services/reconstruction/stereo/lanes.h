@@ -27,8 +27,11 @@ FORGESCAN_INLINE Floats LoadUpper(const std::uint16_t* at) {
   __builtin_memcpy(&upper, at, sizeof(upper));
   return (Floats)(__builtin_convertvector(upper, Ints) << 16);
 }
-FORGESCAN_INLINE void Store(float* at, Floats value) { __builtin_memcpy(at, &value, sizeof(value)); }
-FORGESCAN_INLINE Floats All(float value) { return Floats{} + value; }
+// At any address. Not by memcpy, after which the compiler takes every pointer and number in memory for
+// changed.
+using LooseFloats = float __attribute__((vector_size(64), aligned(4)));
+FORGESCAN_INLINE void Store(float* at, Floats value) { *reinterpret_cast<LooseFloats*>(at) = value; }
+FORGESCAN_INLINE Floats All(float value) { return value - Floats{}; }
 FORGESCAN_INLINE Floats LaneNumbers() { return Floats{0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15}; }
 FORGESCAN_INLINE Floats Magnitude(Floats value) { return (Floats)((Ints)value & 0x7fffffff); }
 // Towards zero; |value| < 2^31.
@@ -66,12 +69,24 @@ FORGESCAN_INLINE Mask Above(Ints a, int limit) {
   return {_mm512_cmpgt_epi32_mask((__m512i)a, _mm512_set1_epi32(limit))};
 }
 FORGESCAN_INLINE Floats Sqrt(Floats value) { return _mm512_sqrt_ps(value); }
-// from[index] for 0 <= index < 32; other lanes are anything.
-FORGESCAN_INLINE Floats LookUpNear(const float* from, Ints index) {
-  return _mm512_permutex2var_ps(Load(from), (__m512i)index, Load(from + kLanes));
+// Lanes kFirst, kFirst + 1, ... of the 32 that low and high are.
+template <int kFirst>
+FORGESCAN_INLINE Floats Shifted(Floats low, Floats high) {
+  return (Floats)_mm512_alignr_epi32((__m512i)high, (__m512i)low, kFirst);
 }
+// from[index] for 0 <= index < 32; other lanes are anything.
+class NearTable {
+ public:
+  FORGESCAN_INLINE explicit NearTable(const float* from) : low_(Load(from)), high_(Load(from + kLanes)) {}
+  FORGESCAN_INLINE Floats operator[](Ints index) const {
+    return _mm512_permutex2var_ps(low_, (__m512i)index, high_);
+  }
+
+ private:
+  Floats low_, high_;
+};
 FORGESCAN_INLINE Floats LookUp(const float* from, Ints index) {
-  return _mm512_i32gather_ps((__m512i)index, from, 4);
+  return _mm512_mask_i32gather_ps(Floats{}, 0xffff, (__m512i)index, from, 4);
 }
 // The chosen lanes one behind the other; writes all 16.
 FORGESCAN_INLINE void StorePacked(float* at, Mask mask, Floats value) {
@@ -129,6 +144,13 @@ FORGESCAN_INLINE Floats Sqrt(Floats value) {
   }
   return value;
 }
+template <int kFirst>
+FORGESCAN_INLINE Floats Shifted(Floats low, Floats high) {
+  float both[2 * kLanes];
+  Store(both, low);
+  Store(both + kLanes, high);
+  return Load(both + kFirst);
+}
 FORGESCAN_INLINE Floats LookUp(const float* from, Ints index) {
   Floats value;
   for (int i = 0; i < kLanes; ++i) {
@@ -136,7 +158,14 @@ FORGESCAN_INLINE Floats LookUp(const float* from, Ints index) {
   }
   return value;
 }
-FORGESCAN_INLINE Floats LookUpNear(const float* from, Ints index) { return LookUp(from, index & 31); }
+class NearTable {
+ public:
+  FORGESCAN_INLINE explicit NearTable(const float* from) : from_(from) {}
+  FORGESCAN_INLINE Floats operator[](Ints index) const { return LookUp(from_, index & (2 * kLanes - 1)); }
+
+ private:
+  const float* from_;
+};
 FORGESCAN_INLINE void StorePacked(float* at, Mask mask, Floats value) {
   const unsigned bits = Bits(mask);
   for (int i = 0; i < kLanes; ++i) {
@@ -185,7 +214,11 @@ FORGESCAN_INLINE Mask IsNumber(Floats value) { return Equal(value, value); }
 FORGESCAN_INLINE Mask BothZero(const std::uint8_t* a, const std::uint8_t* b) {
   const __m128i either = _mm_or_si128(_mm_loadu_si128(reinterpret_cast<const __m128i*>(a)),
                                       _mm_loadu_si128(reinterpret_cast<const __m128i*>(b)));
+#ifdef __AVX512F__
+  return {_mm_testn_epi8_mask(either, either)};
+#else
   return FromBits(static_cast<unsigned>(_mm_movemask_epi8(_mm_cmpeq_epi8(either, _mm_setzero_si128()))));
+#endif
 }
 
 }  // namespace

@@ -3,6 +3,8 @@
 
 #include "services/reconstruction/stereo/kernel.h"
 #include "services/reconstruction/stereo/lanes.h"
+#include "services/reconstruction/stereo/prepare_row.h"
+#include "services/reconstruction/stereo/raw_block.h"
 
 namespace forgescan {
 namespace {
@@ -14,72 +16,109 @@ struct Match {
   Floats column_px, column_step_px, variance_px2;
 };
 
-// The last of the ranks that is not above any of the wanted coordinates, or the first one.
-inline int StartOf(const float* ranks, int length, Floats wanted, Mask valid) {
+// Where the coordinates of a block are among the ranks of a segment: the last ones that are not above them
+// are at begin + index.
+struct Place {
+  int begin;
+  Ints index;
+};
+
+// A place that nothing is known of. wanted: of the valid lanes, within the segment.
+inline __attribute__((noinline)) Place SearchRanks(const float* ranks, int length, Floats wanted,
+                                                   Mask valid) {
   float least = __builtin_inff();
   const unsigned bits = Bits(valid);
   for (int i = 0; i < kLanes; ++i) {
     const float value = wanted[i];
     least = (bits >> i & 1) != 0 && value < least ? value : least;
   }
-  int low = 0, high = length;  // the answer is in [low, high)
+  int low = 0, high = length;  // the last rank that is not above the least is in [low, high)
   while (high - low > 1) {
     const int middle = (low + high) / 2;
     (ranks[middle] <= least ? low : high) = middle;
   }
-  return low;
+  Ints index = {};
+  for (const float* rank = ranks + low + 1; Any(valid & LessEqual(All(*rank), wanted)); ++rank) {
+    index = CountUp(index, LessEqual(All(*rank), wanted));
+  }
+  return {low, index};
 }
 
-// How many ranks from `ranks` on are not above each coordinate.
-FORGESCAN_INLINE Ints CountRanks(const float* ranks, Floats wanted, Mask valid) {
-  constexpr int kUsual = 22;  // 16 pixels of equal scale, what the hint allows for, and some more
-  Ints count = {};
-#pragma GCC unroll 22
-  for (int i = 0; i < kUsual; ++i) {
-    count = CountUp(count, LessEqual(All(ranks[i]), wanted));
-  }
-  for (int i = kUsual; Any(valid & LessEqual(All(ranks[i]), wanted)); ++i) {
-    count = CountUp(count, LessEqual(All(ranks[i]), wanted));
-  }
-  return count;
-}
+// What stands at two neighbouring pixels.
+struct Neighbours {
+  Floats rank, next_rank, column, next_column, variance, next_variance;
+};
 
-// hint: where to begin; only time depends on it. Left at what suits the same columns of the next row.
-FORGESCAN_INLINE Match FindInSegment(Floats wanted, Mask valid, const StereoRow& into,
-                                     const RowSegment& segment, int& hint) {
-  constexpr int kBack = 2;  // ranks a hint is set back by
-  const float* const all_ranks = into.ranks + segment.ranks;
-  const int length = segment.end - segment.begin;
-  int start = hint < 0 ? 0 : (hint < length ? hint : length - 1);
-  const bool too_far = Any(valid & Less(wanted, All(all_ranks[start])));
-  if (too_far || !Any(valid & Less(wanted, All(all_ranks[start + kLanes])))) {
-    start = StartOf(all_ranks, length, wanted, valid);
-  }
-  const Ints count = CountRanks(all_ranks + start, wanted, valid);
-  const Mask in_reach = valid & Above(count, 0);
-  const Ints index = count - 1;
-  hint = start + index[__builtin_ctz(Bits(valid))] - kBack;
-  const int x = segment.begin + start;
-  Floats coordinate, inverse_step, column, next_column, variance;
-  if (!Any(in_reach & Above(index, 2 * kLanes - 1))) {
-    coordinate = LookUpNear(into.coordinate_px + x, index);
-    inverse_step = LookUpNear(into.inverse_step + x, index);
-    column = LookUpNear(into.column_px + x, index);
-    next_column = LookUpNear(into.column_px + x + 1, index);
-    variance = LookUpNear(into.pair_variance_px2 + x, index);
-  } else {
-    coordinate = LookUp(into.coordinate_px + x, index);
-    inverse_step = LookUp(into.inverse_step + x, index);
-    column = LookUp(into.column_px + x, index);
-    next_column = LookUp(into.column_px + x + 1, index);
-    variance = LookUp(into.pair_variance_px2 + x, index);
-  }
-  return {.found = in_reach & IsNumber(inverse_step),
-          .part = (wanted - coordinate) * inverse_step,
+// Ranks, columns and variances of a segment from one place on.
+struct SegmentArrays {
+  const float *rank, *column, *variance;
+
+  FORGESCAN_INLINE SegmentArrays(const StereoRow& row, const RowSegment& segment, int begin)
+      : rank(row.ranks + segment.ranks + begin),
+        column(row.column_px + segment.begin + begin),
+        variance(row.variance_px2 + segment.begin + begin) {}
+};
+
+FORGESCAN_INLINE Match MatchOf(Floats wanted, Mask inside, const SlopeLimits& limits, const Neighbours& at) {
+  const Floats step = at.next_rank - at.rank, inverse_step = 1 / step;
+  const Floats variance = Select(Less(at.variance, at.next_variance), at.next_variance, at.variance);
+  return {.found = inside & IsStep(step, limits) & IsNumber(variance),
+          .part = (wanted - at.rank) * inverse_step,
           .inverse_step = inverse_step,
-          .column_px = column,
-          .column_step_px = next_column - column,
+          .column_px = at.column,
+          .column_step_px = at.next_column - at.column,
           .variance_px2 = variance};
+}
+
+inline __attribute__((noinline)) Match FindAnywhere(Floats wanted, Mask inside, const StereoRow& into,
+                                                    const RowSegment& segment, const SlopeLimits& limits,
+                                                    MatchHint& hint) {
+  const int length = segment.end - segment.begin;
+  const Place place = SearchRanks(into.ranks + segment.ranks, length, wanted, inside);
+  hint.begin = place.begin;
+  __builtin_memcpy(hint.index, &place.index, sizeof(hint.index));
+  const SegmentArrays from(into, segment, place.begin);
+  const Ints index = place.index;
+  return MatchOf(
+      wanted, inside, limits,
+      {LookUp(from.rank, index), LookUp(from.rank + 1, index), LookUp(from.column, index),
+       LookUp(from.column + 1, index), LookUp(from.variance, index), LookUp(from.variance + 1, index)});
+}
+
+FORGESCAN_INLINE Mask InSegment(Floats wanted, Mask valid, const RowSegment& segment) {
+  return valid & LessEqual(All(segment.low), wanted) & LessEqual(wanted, All(segment.high));
+}
+
+// In a row of one segment. hint: where to begin; only time depends on it. Left at what suits the same columns
+// of the next row.
+FORGESCAN_INLINE Match FindInSegment(Floats wanted, Mask inside, const StereoRow& into,
+                                     const SlopeLimits& limits, MatchHint& hint) {
+  constexpr int kTries = 4;
+  constexpr int kMiddle = 6;  // where the hints of a block begin
+  const RowSegment& segment = into.segments[0];
+  const int length = segment.end - segment.begin;
+  const int begin = hint.begin < 0 ? 0 : (hint.begin < length ? hint.begin : length - 1);
+  const SegmentArrays from(into, segment, begin);
+  const NearTable ranks(from.rank);
+  Ints index;
+  __builtin_memcpy(&index, hint.index, sizeof(index));
+  for (int i = 0; i < kTries; ++i) {
+    const Floats rank = ranks[index], next_rank = ranks[index + 1];
+    const Mask above = inside & LessEqual(next_rank, wanted), below = inside & Less(wanted, rank);
+    if (!Any(above | below)) {
+      index = index & (2 * kLanes - 1);
+      const int shift = index[__builtin_ctz(Bits(inside))] - kMiddle;
+      hint.begin = begin + shift;
+      const Ints next_index = index - shift;
+      __builtin_memcpy(hint.index, &next_index, sizeof(index));
+      const NearTable columns(from.column), variances(from.variance);
+      return MatchOf(
+          wanted, inside, limits,
+          {rank, next_rank, columns[index], columns[index + 1], variances[index], variances[index + 1]});
+    }
+    index = CountUp(index, above) - CountUp(Ints{}, below);
+  }
+  return FindAnywhere(wanted, inside, into, segment, limits, hint);
 }
 
 struct BlockRange {
@@ -104,7 +143,8 @@ struct Search {
 };
 
 // A row with folds, or with something thin before it: every segment that has such coordinates.
-inline __attribute__((noinline)) Search FindInSegments(Floats wanted, Mask valid, const StereoRow& into) {
+inline __attribute__((noinline)) Search FindInSegments(Floats wanted, Mask valid, const StereoRow& into,
+                                                       const SlopeLimits& limits) {
   const BlockRange range = RangeOf(wanted, valid);
   Search search = {};
   search.first.found = FromBits(0);
@@ -114,8 +154,9 @@ inline __attribute__((noinline)) Search FindInSegments(Floats wanted, Mask valid
     if (segment.low > range.high || segment.high < range.low) {
       continue;
     }
-    int hint = 0;
-    const Match match = FindInSegment(wanted, valid, into, segment, hint);
+    MatchHint unused;
+    const Match match =
+        FindAnywhere(wanted, InSegment(wanted, valid, segment), into, segment, limits, unused);
     search.twice = search.twice | (search.first.found & match.found);
     const Mask fresh = Without(match.found, search.first.found);
     search.first.part = Select(fresh, match.part, search.first.part);
@@ -128,42 +169,48 @@ inline __attribute__((noinline)) Search FindInSegments(Floats wanted, Mask valid
   return search;
 }
 
-FORGESCAN_INLINE Search Find(Floats wanted, Mask valid, const StereoRow& left, const StereoRow& right,
-                             int& hint) {
+inline __attribute__((noinline)) Search FindAmongFolds(Floats wanted, Mask valid, const MatchTask& task) {
   Search search = {};
-  if (right.segment_count == 1) {
-    search.first = FindInSegment(wanted, valid, right, right.segments[0], hint);
-    search.twice = FromBits(0);
-  } else if (right.segment_count <= kMaxSegments) {
-    search = FindInSegments(wanted, valid, right);
-  } else {
+  if (task.right->segment_count > kMaxSegments) {
     search.first.found = search.twice = valid;
+    return search;
   }
-  if (left.segment_count > 1) {
-    const bool too_many = left.segment_count > kMaxSegments;
-    const Mask again = too_many ? valid : FindInSegments(wanted, valid, left).twice;
-    search.twice = search.twice | (search.first.found & again);
-  }
+  search = FindInSegments(wanted, valid, *task.right, task.limits.right);
+  const bool too_many = task.left->segment_count > kMaxSegments;
+  const Mask again = too_many ? valid : FindInSegments(wanted, valid, *task.left, task.limits.left).twice;
+  search.twice = search.twice | (search.first.found & again);
   return search;
+}
+
+FORGESCAN_INLINE Search Find(Floats wanted, Mask valid, const MatchTask& task, MatchHint& hint) {
+  const StereoRow& right = *task.right;
+  if (task.left->segment_count != 1 || right.segment_count != 1) {
+    return FindAmongFolds(wanted, valid, task);
+  }
+  const Mask inside = InSegment(wanted, valid, right.segments[0]);
+  if (!Any(inside)) {
+    const Floats none = {};
+    return {{inside, none, none, none, none, none}, inside};
+  }
+  return {FindInSegment(wanted, inside, right, task.limits.right, hint), FromBits(0)};
 }
 
 // Whether going there and back closes, the left row taken as straight on either side of the pixel: with a and
 // b the coordinates between the pixel and its two right neighbours, back - here = a b / (a + b) (1 /
 // right_step - 1 / left_step).
-FORGESCAN_INLINE Mask Closes(int x, const StereoRow& left, const Match& match, float max_left_right_px) {
-  const int block = x / kLanes;
-  const unsigned pairs = left.pair_bits[block];
-  const unsigned before = x == 0 ? 0 : left.pair_bits[block - 1] >> 15 & 1U;
-  const Mask on_one_surface = FromBits(pairs & (pairs << 1 | before));
+FORGESCAN_INLINE Mask Closes(int x, const StereoRow& left, const Match& match, const MatchLimits& limits) {
   const Floats center = Load(left.coordinate_px + x);
   const Floats left_step = center - Load(left.coordinate_px + x - 1);
   const Floats right_step = Load(left.coordinate_px + x + 1) - center;
+  const Mask on_one_surface = IsStep(left_step, limits.left) & IsStep(right_step, limits.left);
   const Floats gap = match.part * (1 - match.part) * Magnitude(left_step - right_step);
-  return on_one_surface & LessEqual(gap, max_left_right_px * left_step * right_step * match.inverse_step);
+  return on_one_surface &
+         LessEqual(gap, limits.max_left_right_px * left_step * right_step * match.inverse_step);
 }
 
-FORGESCAN_INLINE MatchCounts MatchBlock(int x, const StereoRow& left, const StereoRow& right,
-                                        float max_left_right_px, int& hint, const DisparityRow& disparity) {
+FORGESCAN_INLINE MatchCounts MatchBlock(const MatchTask& task, int block, const DisparityRow& disparity) {
+  const StereoRow& left = *task.left;
+  const int x = block * kLanes;
   const Floats wanted = Load(left.coordinate_px + x);
   const Mask valid = IsNumber(wanted);
   const Floats none = All(__builtin_nanf(""));
@@ -173,10 +220,10 @@ FORGESCAN_INLINE MatchCounts MatchBlock(int x, const StereoRow& left, const Ster
   }
   // Between two right pixels that share three fifths of their noise (five-point parabolas of neighbours).
   constexpr float kUnshared = 2 * (1 - 336.0F / 595);
-  const Search search = Find(wanted, valid, left, right, hint);
+  const Search search = Find(wanted, valid, task, task.hints[block]);
   const Match& match = search.first;
   const Mask once = Without(match.found, search.twice);
-  const Mask good = once & Closes(x, left, match, max_left_right_px);
+  const Mask good = once & Closes(x, left, match, task.limits);
   const Floats partner = match.column_px + match.part * match.column_step_px;
   const Floats px_per_coordinate = match.column_step_px * match.inverse_step;
   const Floats right_variance = match.variance_px2 * (1 - kUnshared * match.part * (1 - match.part));
@@ -190,12 +237,11 @@ FORGESCAN_INLINE MatchCounts MatchBlock(int x, const StereoRow& left, const Ster
           .left_right = Count(Without(once, good))};
 }
 
-inline MatchCounts MatchRow(int blocks, const StereoRow& left, const StereoRow& right,
-                            float max_left_right_px, int* hints, const DisparityRow& disparity) {
+inline MatchCounts MatchRow(const MatchTask& task, const DisparityRow& disparity) {
   MatchCounts sum;
-  for (int block = 0; block < blocks; ++block) {
-    const MatchCounts counts =
-        MatchBlock(block * kLanes, left, right, max_left_right_px, hints[block], disparity);
+  for (int block = 0; block < task.blocks; ++block) {
+    FetchAhead(task.next, block);
+    const MatchCounts counts = MatchBlock(task, block, disparity);
     sum.candidates += counts.candidates;
     sum.no_partner += counts.no_partner;
     sum.ambiguous += counts.ambiguous;

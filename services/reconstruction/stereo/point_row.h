@@ -4,23 +4,28 @@
 #include "services/reconstruction/stereo/kernel.h"
 #include "services/reconstruction/stereo/lanes.h"
 #include "services/reconstruction/stereo/projector_lanes.h"
+#include "services/reconstruction/stereo/raw_block.h"
 
 namespace forgescan {
 namespace {
 
 // Sums over the columns of the window, and their moments about its middle row; NaN where a pixel is missing.
-FORGESCAN_INLINE void SumColumns(const PointTask& task, int radius) {
-  for (int x = 0; x < task.blocks * kLanes; x += kLanes) {
-    Floats sum = Load(task.rows[radius] + x);
-    Floats moment = {};
-    for (int k = 1; k <= radius; ++k) {
-      const Floats above = Load(task.rows[radius - k] + x), below = Load(task.rows[radius + k] + x);
-      sum += above + below;
-      moment += static_cast<float>(k) * (below - above);
-    }
-    Store(task.sums + x, sum);
-    Store(task.moments + x, moment);
+// Only where a window of the middle row can reach.
+FORGESCAN_INLINE void SumColumns(const PointTask& task, int x, int radius) {
+  const float* const middle = task.rows[radius] + x;
+  const Floats here = Load(middle);
+  if (!Any(IsNumber(here) | IsNumber(Load(middle - kLanes)) | IsNumber(Load(middle + kLanes)))) {
+    return;
   }
+  Floats sum = here;
+  Floats moment = {};
+  for (int k = 1; k <= radius; ++k) {
+    const Floats above = Load(task.rows[radius - k] + x), below = Load(task.rows[radius + k] + x);
+    sum += above + below;
+    moment += static_cast<float>(k) * (below - above);
+  }
+  Store(task.sums + x, sum);
+  Store(task.moments + x, moment);
 }
 
 struct Gradient {
@@ -192,8 +197,13 @@ FORGESCAN_INLINE void PointBlock(const PointTask& task, int block, int radius, c
 
 FORGESCAN_INLINE void PointBlocks(const PointTask& task, int radius, const PointGeometry& geometry,
                                   PointRow& points) {
-  SumColumns(task, radius);
+  constexpr int kAhead = 2;  // blocks: what was stored a moment ago cannot be read again at once
+  for (int block = 0; block < kAhead; ++block) {
+    SumColumns(task, block * kLanes, radius);
+  }
   for (int block = 0; block < task.blocks; ++block) {
+    FetchAhead(task.next, block);
+    SumColumns(task, (block + kAhead) * kLanes, radius);
     PointBlock(task, block, radius, geometry, points);
   }
 }

@@ -7,35 +7,42 @@
 namespace forgescan {
 namespace {
 
-FORGESCAN_INLINE Mask IsStep(Floats step, SlopeLimits limits) {
+// Whether two neighbours that differ by this are one surface.
+FORGESCAN_INLINE Mask IsStep(Floats step, const SlopeLimits& limits) {
   return LessEqual(All(limits.low), step) & LessEqual(step, All(limits.high));
 }
 
-FORGESCAN_INLINE unsigned PairBits(const float* at, SlopeLimits limits) {
-  return Bits(IsStep(Load(at + 1) - Load(at), limits));
-}
+// The block before, this one and the one behind it, of the raw coordinates.
+struct RawBlocks {
+  Floats before, here, behind;
+};
+
+struct Smoothed {
+  Floats coordinate, variance;
+};
 
 // Least squares by a parabola over five pixels of one surface (Savitzky and Golay, Anal. Chem. 36 (1964)
 // 1627): no bias up to the third derivative, 17/35 of the variance. Where one of the five is missing the
 // pixel stays as it is. A pixel that is off its parabola by more than the limit, and by more than 4 sigma,
 // belongs to no surface.
-// pairs: which neighbours of the block, the one before and the one behind are one surface.
-FORGESCAN_INLINE void SmoothBlock(int x, const unsigned (&pairs)[3], float max_off_px, const StereoRow& row) {
-  const float* const raw = row.raw_px + x;
-  const Floats center = Load(raw), left = Load(raw - 1), right = Load(raw + 1);
-  const Floats far_left = Load(raw - 2), far_right = Load(raw + 2);
-  const Mask smooth = FromBits((pairs[1] << 2 | pairs[0] >> 14) & (pairs[1] << 1 | pairs[0] >> 15) &
-                               pairs[1] & (pairs[1] >> 1 | pairs[2] << 15) & 0xffff);
+FORGESCAN_INLINE Smoothed SmoothBlock(int x, const RawBlocks& raw, const SlopeLimits& limits,
+                                      const StereoRow& row) {
+  const Floats center = raw.here;
+  const Floats left = Shifted<kLanes - 1>(raw.before, raw.here), right = Shifted<1>(raw.here, raw.behind);
+  const Floats far_left = Shifted<kLanes - 2>(raw.before, raw.here);
+  const Floats far_right = Shifted<2>(raw.here, raw.behind);
+  const Mask smooth = IsStep(left - far_left, limits) & IsStep(center - left, limits) &
+                      IsStep(right - center, limits) & IsStep(far_right - right, limits);
   const Floats near_bend = (left - center) + (right - center);
   const Floats far_bend = (far_left - center) + (far_right - center);
   const Floats change = 12.0F / 35 * near_bend - 3.0F / 35 * far_bend;
   const Floats variance = Load(row.variance_px2 + x);
   const Floats square = change * change;
-  const Mask off =
-      smooth & Less(All(max_off_px * max_off_px), square) & Less(16 * 18.0F / 35 * variance, square);
-  const Floats smoothed = Select(smooth, center + change, center);
-  Store(row.coordinate_px + x, Select(off, All(__builtin_nanf("")), smoothed));
-  Store(row.variance_px2 + x, Select(smooth, 17.0F / 35 * variance, variance));
+  const Mask off = smooth & Less(All(limits.max_off_px * limits.max_off_px), square) &
+                   Less(16 * 18.0F / 35 * variance, square);
+  const Floats coordinate = Select(off, All(__builtin_nanf("")), Select(smooth, center + change, center));
+  Store(row.coordinate_px + x, coordinate);
+  return {coordinate, Select(smooth, 17.0F / 35 * variance, variance)};
 }
 
 // Splits a row into segments of ascending coordinates while it is read from left to right.
@@ -48,8 +55,7 @@ class Segmenter {
 
   // pairs: of the block; in_pair: the lanes that belong to a pair with either neighbour. Others are no part
   // of any surface.
-  void AddBlock(int x, unsigned pairs, unsigned in_pair) {
-    const Floats coordinate = Load(row_.coordinate_px + x);
+  void AddBlock(int x, Floats coordinate, unsigned pairs, unsigned in_pair) {
     float* const ranks = row_.ranks + x + shift_;
     if (in_pair == 0) {
       Store(ranks, All(last_));
@@ -116,27 +122,23 @@ class Segmenter {
   bool is_full_ = false;
 };
 
-inline void PrepareRow(int blocks, SlopeLimits limits, StereoRow& row) {
-  unsigned pairs_of[3] = {0, 0, PairBits(row.raw_px, limits)};
-  for (int x = 0; x < blocks * kLanes; x += kLanes) {
-    pairs_of[0] = pairs_of[1];
-    pairs_of[1] = pairs_of[2];
-    pairs_of[2] = PairBits(row.raw_px + x + kLanes, limits);  // NaN behind the row: none
-    SmoothBlock(x, pairs_of, limits.max_off_px, row);
-  }
+inline void PrepareRow(int blocks, const SlopeLimits& limits, StereoRow& row) {
+  const Floats none = All(__builtin_nanf(""));
+  RawBlocks raw = {none, none, Load(row.raw_px)};
+  Smoothed here = {none, none};
   Segmenter segmenter(row);
   unsigned before = 0;
-  for (int block = 0; block < blocks; ++block) {
-    const int x = block * kLanes;
-    const Floats step = Load(row.coordinate_px + x + 1) - Load(row.coordinate_px + x);
-    const Mask is_pair = IsStep(step, limits);
-    Store(row.inverse_step + x, Select(is_pair, 1 / step, All(__builtin_nanf(""))));
-    const Floats variance = Load(row.variance_px2 + x), next_variance = Load(row.variance_px2 + x + 1);
-    Store(row.pair_variance_px2 + x, Select(Less(variance, next_variance), next_variance, variance));
-    const unsigned pairs = Bits(is_pair);
-    row.pair_bits[block] = static_cast<std::uint16_t>(pairs);
-    segmenter.AddBlock(x, pairs, (pairs | pairs << 1 | before) & 0xffff);
-    before = pairs >> 15;
+  for (int x = 0; x <= blocks * kLanes; x += kLanes) {
+    raw = {raw.here, raw.behind, Load(row.raw_px + x + kLanes)};  // NaN behind the row
+    const Smoothed next = x < blocks * kLanes ? SmoothBlock(x, raw, limits, row) : Smoothed{none, none};
+    if (x > 0) {
+      const Floats step = Shifted<1>(here.coordinate, next.coordinate) - here.coordinate;
+      const unsigned pairs = Bits(IsStep(step, limits)), in_pair = (pairs | pairs << 1 | before) & 0xffff;
+      Store(row.variance_px2 + x - kLanes, Select(FromBits(in_pair), here.variance, none));
+      segmenter.AddBlock(x - kLanes, here.coordinate, pairs, in_pair);
+      before = pairs >> 15;
+    }
+    here = next;
   }
   segmenter.Finish(blocks * kLanes);
   row.segment_count = segmenter.is_full() ? kMaxSegments + 1 : row.segment_count;

@@ -26,18 +26,14 @@ class RowArrays {
 class PreparedRow {
  public:
   PreparedRow(int blocks, float* coordinate_px, float* variance_px2, float* column_px)
-      : arrays_(3, blocks * kStereoLanes),
+      : arrays_(1, blocks * kStereoLanes),
         ranks_(static_cast<std::size_t>(blocks * kStereoLanes + (kMaxSegments + 1) * kSegmentMargin)),
-        pair_bits_(static_cast<std::size_t>(blocks)),
         segments_(kMaxSegments) {
     row_ = {.raw_px = arrays_[0],
             .coordinate_px = coordinate_px,
             .variance_px2 = variance_px2,
             .column_px = column_px,
-            .inverse_step = arrays_[1],
-            .pair_variance_px2 = arrays_[2],
             .ranks = ranks_.data(),
-            .pair_bits = pair_bits_.data(),
             .segments = segments_.data(),
             .segment_count = 0};
   }
@@ -46,7 +42,6 @@ class PreparedRow {
  private:
   RowArrays arrays_;
   std::vector<float> ranks_;
-  std::vector<std::uint16_t> pair_bits_;
   std::vector<RowSegment> segments_;
   StereoRow row_;
 };

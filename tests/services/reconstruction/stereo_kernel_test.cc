@@ -56,14 +56,20 @@ Matched MatchRows(const StereoKernel& kernel, const Row& left, const Row& right,
                   SlopeLimits limits = kLimits) {
   const int blocks = std::max(BlocksOf(left), BlocksOf(right));
   Line left_line(kernel, left, blocks, limits), right_line(kernel, right, blocks, limits);
-  std::vector<int> hints(static_cast<std::size_t>(blocks), -7);
+  const std::vector<EpipolarBlock> nothing(static_cast<std::size_t>(blocks));  // to fetch ahead
+  std::vector<MatchHint> hints(static_cast<std::size_t>(blocks), MatchHint{-7, {-7, 99, 31}});
+  const MatchTask task = {.left = &left_line.prepared.row(),
+                          .right = &right_line.prepared.row(),
+                          .limits = {limits, limits, 0.2F},
+                          .blocks = blocks,
+                          .next = {nullptr, nothing.data()},
+                          .hints = hints.data()};
   Matched matched{Row(static_cast<std::size_t>(blocks * kStereoLanes)),
                   Row(static_cast<std::size_t>(blocks * kStereoLanes)),
                   {}};
   const DisparityRow out = {matched.disparity_px.data(), matched.variance_px2.data()};
   for (int i = 0; i < 2; ++i) {  // the second time with what the first one left as hints
-    matched.counts =
-        kernel.match(blocks, left_line.prepared.row(), right_line.prepared.row(), 0.2F, hints.data(), out);
+    matched.counts = kernel.match(task, out);
   }
   return matched;
 }

@@ -21,7 +21,32 @@ using Row = std::vector<float>;
 const StereoKernel& Plain() { return *StereoKernels().back(); }
 
 // Lines that slant through an image of odd width, with masked pixels, jumps and lines that leave the image.
-Row SampleAll(const StereoKernel& kernel) {
+// extra_rows: that the blocks' lists of rows are too long by.
+struct Lines {
+  float slant = 0.1F;
+  bool is_listed_closely = false;
+  int extra_rows = 0;
+};
+
+EpipolarBlock BlockOf(const Lines& lines, int height, float row, int block) {
+  EpipolarBlock result = {
+      {row, lines.slant, lines.slant / 100}, {static_cast<float>(16 * block), 1.01F, 0.0001F}, 0, 0};
+  if (!lines.is_listed_closely) {
+    result.row_count = static_cast<std::uint16_t>(height - 1);
+    return result;
+  }
+  const int first = std::max(static_cast<int>(std::floor(row)), 0);
+  const int last = std::min(static_cast<int>(std::floor(row + 17.25F * lines.slant)), height - 2);
+  if (last >= first) {
+    result.row[0] -= static_cast<float>(first);
+    result.first_row = static_cast<std::uint16_t>(first);
+    result.row_count =
+        static_cast<std::uint16_t>(std::min(last - first + 1 + lines.extra_rows, height - 1 - first));
+  }
+  return result;
+}
+
+Row SampleAll(const StereoKernel& kernel, const Lines& lines) {
   constexpr int kWidth = 53, kHeight = 20, kBlocks = 4;
   std::mt19937 random(9);
   std::uniform_real_distribution<float> uniform(0, 1);
@@ -41,16 +66,16 @@ Row SampleAll(const StereoKernel& kernel) {
   for (int row = -2; row < kHeight; ++row) {
     std::vector<EpipolarBlock> blocks(kBlocks);
     for (int b = 0; b < kBlocks; ++b) {
-      const auto begin = static_cast<float>(row) + 0.3F + 1.6F * static_cast<float>(b);
-      blocks[static_cast<std::size_t>(b)] = {
-          {begin, 0.1F, 0.001F}, {static_cast<float>(16 * b), 1.01F, 0.0001F}, 0, kHeight - 1};
+      const float begin = static_cast<float>(row) + 0.3F + 16 * lines.slant * static_cast<float>(b);
+      blocks[static_cast<std::size_t>(b)] = BlockOf(lines, kHeight, begin, b);
     }
     RowArrays arrays(3, kBlocks * kStereoLanes);
     PreparedRow prepared(kBlocks, arrays[0], arrays[1], arrays[2]);
     kernel.sample(view, blocks.data(), prepared.row());
     for (int x = 0; x < kWidth; ++x) {
+      const bool has_value = !std::isnan(prepared.row().raw_px[x]);
       all.push_back(prepared.row().raw_px[x]);
-      all.push_back(prepared.row().variance_px2[x]);
+      all.push_back(has_value ? prepared.row().variance_px2[x] : 0);
       all.push_back(prepared.row().column_px[x]);
     }
   }
@@ -58,17 +83,28 @@ Row SampleAll(const StereoKernel& kernel) {
 }
 
 TEST(StereoKernel, SamplesBetweenValidRowsOnly) {
-  const Row plain = SampleAll(Plain());
-  const auto numbers = std::count_if(plain.begin(), plain.end(), [](float v) { return !std::isnan(v); });
-  EXPECT_LT(numbers, std::ssize(plain));
-  EXPECT_GT(numbers, std::ssize(plain) / 2);
-  for (std::size_t i = 0; i < plain.size(); i += 3) {
-    ASSERT_TRUE(std::isnan(plain[i]) || (plain[i] <= 0 && plain[i] > -64))
-        << i;  // sign -1; 9 px jumps are not mixed in
+  for (const Lines& lines : {Lines{}, Lines{.slant = 0.03F, .is_listed_closely = true}}) {
+    const Row plain = SampleAll(Plain(), lines);
+    const auto numbers = std::count_if(plain.begin(), plain.end(), [](float v) { return !std::isnan(v); });
+    EXPECT_LT(numbers, std::ssize(plain));
+    EXPECT_GT(numbers, std::ssize(plain) / 2);
+    for (std::size_t i = 0; i < plain.size(); i += 3) {
+      ASSERT_TRUE(std::isnan(plain[i]) || (plain[i] <= 0 && plain[i] > -64))
+          << i;  // sign -1; 9 px jumps are not mixed in
+    }
+    for (const StereoKernel* kernel : StereoKernels()) {
+      const Row other = SampleAll(*kernel, lines);
+      EXPECT_EQ(std::memcmp(plain.data(), other.data(), plain.size() * sizeof(float)), 0) << kernel->name;
+    }
   }
+}
+
+// One or two rows are taken at once, more of them one by one.
+TEST(StereoKernel, SamplesTheSameHoweverManyRowsAreListed) {
   for (const StereoKernel* kernel : StereoKernels()) {
-    const Row other = SampleAll(*kernel);
-    EXPECT_EQ(std::memcmp(plain.data(), other.data(), plain.size() * sizeof(float)), 0) << kernel->name;
+    const Row close = SampleAll(*kernel, {.slant = 0.03F, .is_listed_closely = true});
+    const Row loose = SampleAll(*kernel, {.slant = 0.03F, .is_listed_closely = true, .extra_rows = 3});
+    EXPECT_EQ(std::memcmp(close.data(), loose.data(), close.size() * sizeof(float)), 0) << kernel->name;
   }
 }
 
@@ -98,8 +134,17 @@ Row TriangulateAll(const StereoKernel& kernel, bool with_holes) {
   Row out(9 * kRoom, 0);
   float* const at = out.data();
   PointRow points = {at, at + 3 * kRoom, at + 6 * kRoom, at + 7 * kRoom, at + 8 * kRoom, 0, 0, 0, 0, 0, 0};
-  kernel.triangulate({rows.data(), &left.row(), &disparity, blocks.data(), blocks.data(), blocks.data(),
-                      scratch[4], scratch[5], kBlocks},
+  const std::vector<EpipolarBlock> nothing(kBlocks);  // to fetch ahead
+  kernel.triangulate({rows.data(),
+                      &left.row(),
+                      &disparity,
+                      blocks.data(),
+                      blocks.data(),
+                      blocks.data(),
+                      scratch[4],
+                      scratch[5],
+                      kBlocks,
+                      {nullptr, nothing.data()}},
                      {1000, 100000, 5, 50, 10000, 0.117F, 0.003F, 3, 1, nullptr}, points);
   // Behind the points stands whatever was packed last.
   std::fill(at + 3 * points.count, at + 3 * kRoom, 0.0F);
