@@ -61,13 +61,14 @@ TEST(CoverageTest, AnErrorThatIsNotStatedShows) {
 }
 
 // The evaluation cannot know over what length errors go together: it takes `patch_cell_mm` and
-// `form_cell_mm`. Half and three times those. Longer patches are a small part of U; a longer form is not, so
-// its intervals hold the truth less often, and how much less is stated.
+// `form_cell_mm`. With half and three times those, 500 parts each: 93.6 to 96.6 % of every size, but 93.0
+// and 93.6 % of the diameters with a form three times as long, whose 0.02 mm more nobody states: 1.83
+// standard deviations, 93 %.
 struct Lengths {
   double patch, form;
   double least_share;  // stated share, before chance
 };
-const Lengths kLengths[] = {{0.5, 1, kStated}, {3, 1, kStated}, {1, 0.5, kStated}, {1, 3, 0.90}};
+const Lengths kLengths[] = {{0.5, 1, kStated}, {3, 1, kStated}, {1, 0.5, kStated}, {1, 3, 0.93}};
 
 Result<std::vector<Coverage>> RunLengths(const Lengths& lengths, CoverageOptions options) {
   options.patch_lengths = lengths.patch;
