@@ -45,18 +45,6 @@ std::vector<cv::Mat> Render(const VirtualCell& cell, const GeometryMap& map, con
   return ExposeAll(map, cell.config(), cell.Patterns(ProjectedSet::kReduced), key, threads);
 }
 
-// As many as the service publishes, though not the same ones: it begins each row at another point.
-PointCloud EveryNth(const PointCloud& cloud, int n, int view) {
-  PointCloud thin;
-  for (std::size_t i = 0; i < cloud.size(); i += static_cast<std::size_t>(n)) {
-    thin.points.push_back(cloud.points[i]);
-    thin.normals.push_back(cloud.normals[i]);
-    thin.sigma_mm.push_back(cloud.sigma_mm[i]);
-  }
-  thin.view.assign(thin.size(), static_cast<std::uint16_t>(view));
-  return thin;
-}
-
 PointCloud PartInModel(const PointCloud& cloud, const std::vector<std::uint32_t>& part,
                        const Eigen::Isometry3d& model_from_array) {
   PointCloud moved;
@@ -106,8 +94,10 @@ Result<VirtualInspection> VirtualInspection::Create(CellConfig config, const Exp
   ASSIGN_OR_RETURN(inspection.files_, Commission(config, options));
   const StationFiles& files = inspection.files_;
   const ImageSize size{config.rig.left.width_px, config.rig.left.height_px};
-  ASSIGN_OR_RETURN(Reconstructor reconstructor, Reconstructor::Create(files.pattern, files.calibration, size,
-                                                                      files.reconstruction.reconstruction));
+  ReconstructionConfig reconstruction = files.reconstruction.reconstruction;
+  reconstruction.keep_every_nth_point = files.reconstruction.publish_every_nth_point;
+  ASSIGN_OR_RETURN(Reconstructor reconstructor,
+                   Reconstructor::Create(files.pattern, files.calibration, size, reconstruction));
   inspection.reconstructor_ = std::make_shared<const Reconstructor>(std::move(reconstructor));
   ASSIGN_OR_RETURN(RegistrationModel model, RegistrationModel::Build(files.model));
   inspection.model_ = std::make_shared<const RegistrationModel>(std::move(model));
@@ -123,13 +113,11 @@ Result<ViewCloud> VirtualInspection::Scan(const PartState& part, const ViewState
     ASSIGN_OR_RETURN(const GeometryMap map, cell_->Map(part, view, side));
     images[static_cast<std::size_t>(side)] = Render(*cell_, map, view, side, threads_);
   }
-  const auto result = reconstructor_->Run(images[0], images[1]);
+  auto result = reconstructor_->Run(images[0], images[1]);
   if (!result.ok()) {
     return Fail(result.error().code, "visit {}, view {}: {}", view.visit, view.view, result.error().message);
   }
-  return ViewCloud{
-      view.view, view.pyrometer_degc,
-      EveryNth(result->cloud_in_camera, files_.reconstruction.publish_every_nth_point, view.view)};
+  return ViewCloud{view.view, view.pyrometer_degc, std::move(result->cloud_in_camera)};
 }
 
 Result<InspectedPart> VirtualInspection::Measure(const std::vector<ViewCloud>& views,
