@@ -143,6 +143,39 @@ Result<InspectedPart> VirtualInspection::Measure(const std::vector<ViewCloud>& v
   return inspected;
 }
 
+Result<StandingSurfaces> VirtualInspection::ScanWithout(PartState part,
+                                                        const std::vector<ViewState>& views) const {
+  constexpr double kOutOfSightMm = 30'000;
+  part.array_from_part.translation().x() += kOutOfSightMm;
+  StandingSurfaces standing;
+  for (const ViewState& view : views) {
+    const Result<ViewCloud> scan = Scan(part, view);
+    // Refused: too little stands still in this view's sight.
+    if (!scan.ok() && scan.error().code != ErrorCode::kUntrusted) {
+      return scan.error();
+    }
+    standing.push_back(scan.ok() ? SurfaceCells(scan->cloud_in_camera, VisitErrorOptions().cells)
+                                 : std::vector<SurfaceCell>());
+  }
+  return standing;
+}
+
+Result<ViewMatrices> VirtualInspection::MatricesOfVisit(const std::vector<ViewCloud>& views,
+                                                        const StandingSurfaces& standing) const {
+  const RobotScatter& robot = config().robot;
+  VisitErrorOptions options;
+  options.robot_shift_mm = robot.position_sd_mm;
+  options.robot_turn_rad = robot.rotation_sd_rad;
+  ViewMatrices matrices = files_.views;
+  for (const ViewCloud& view : views) {
+    const auto index = static_cast<std::size_t>(view.view);
+    ASSIGN_OR_RETURN(const VisitError error,
+                     EstimateVisitError(standing.at(index), view.cloud_in_camera, options));
+    matrices.array_from_camera[index] = matrices.array_from_camera[index] * error.taught_from_actual;
+  }
+  return matrices;
+}
+
 ViewState ScatterAtTarget(const ViewState& view, const CellConfig& config) {
   const Eigen::Translation3d to_target(0, 0, config.working_distance_mm);
   ViewState moved = view;

@@ -11,6 +11,7 @@
 #include "services/common/imaging/stereo_calibration.h"
 #include "services/fusion/fuse.h"
 #include "services/fusion/fusion_config.h"
+#include "services/fusion/visit_error.h"
 #include "services/reconstruction/reconstruction_service.h"
 #include "services/registration/registration_config.h"
 #include "services/report/model_evaluator.h"
@@ -46,6 +47,9 @@ struct InspectedPart {
   std::size_t points = 0, part_points = 0;
 };
 
+// What stands still about the part, by view, as cells of its cloud; none where a view sees too little of it.
+using StandingSurfaces = std::vector<std::vector<SurfaceCell>>;
+
 class VirtualInspection {
  public:
   static Result<VirtualInspection> Create(CellConfig config, const ExperimentOptions& options);
@@ -64,6 +68,13 @@ class VirtualInspection {
   Result<InspectedPart> Measure(const std::vector<ViewCloud>& views, const ViewMatrices& matrices) const;
 
   const ViewMatrices& matrices() const { return files_.views; }
+
+  // The views of the cell without the part.
+  Result<StandingSurfaces> ScanWithout(PartState part, const std::vector<ViewState>& views) const;
+  // The view matrices with the robot's error of this visit as the standing surfaces show it. Errors: those of
+  // EstimateVisitError.
+  Result<ViewMatrices> MatricesOfVisit(const std::vector<ViewCloud>& views,
+                                       const StandingSurfaces& standing) const;
 
  private:
   VirtualInspection() = default;

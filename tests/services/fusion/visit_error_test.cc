@@ -1,0 +1,119 @@
+#include "services/fusion/visit_error.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <random>
+
+namespace forgescan {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr double kNoiseMm = 0.02;
+const Eigen::Vector3d kMiddle(0, 0, 650);  // of what the camera sees
+
+// A square of 100 mm through `center`, a point every 0.6 mm.
+void AddSquare(const Eigen::Vector3d& center, const Eigen::Vector3d& normal, std::mt19937& random,
+               PointCloud& cloud) {
+  std::normal_distribution<double> noise(0, kNoiseMm);
+  const Eigen::Vector3d u = normal.unitOrthogonal(), v = normal.cross(u);
+  for (int i = -83; i <= 83; ++i) {
+    for (int j = -83; j <= 83; ++j) {
+      const Eigen::Vector3d p = center + 0.6 * (i * u + j * v) + noise(random) * normal;
+      cloud.points.push_back(p.cast<float>());
+      cloud.normals.push_back(normal.cast<float>());
+      cloud.sigma_mm.push_back(static_cast<float>(kNoiseMm));
+    }
+  }
+}
+
+PointCloud Plane(unsigned seed) {
+  std::mt19937 random(seed);
+  PointCloud cloud;
+  AddSquare(kMiddle, -Eigen::Vector3d::UnitZ(), random, cloud);
+  return cloud;
+}
+
+// Three squares that fix all six motions.
+PointCloud Corner(unsigned seed) {
+  std::mt19937 random(seed);
+  PointCloud cloud;
+  AddSquare(kMiddle + Eigen::Vector3d(0, 80, 0), Eigen::Vector3d(0, 0, -1), random, cloud);
+  AddSquare(kMiddle + Eigen::Vector3d(90, 0, 0), Eigen::Vector3d(-0.8, 0, -0.6), random, cloud);
+  AddSquare(kMiddle + Eigen::Vector3d(-90, -60, 0), Eigen::Vector3d(0, 0.8, -0.6), random, cloud);
+  return cloud;
+}
+
+PointCloud Moved(PointCloud cloud, const Eigen::Isometry3d& motion) {
+  for (Eigen::Vector3f& p : cloud.points) p = (motion * p.cast<double>()).cast<float>();
+  for (Eigen::Vector3f& n : cloud.normals) n = (motion.linear() * n.cast<double>()).cast<float>();
+  return cloud;
+}
+
+Eigen::Isometry3d Motion(const Eigen::Vector3d& shift_mm, const Eigen::Vector3d& turn_rad) {
+  return Eigen::Translation3d(kMiddle + shift_mm) *
+         Eigen::AngleAxisd(turn_rad.norm(), (turn_rad + Eigen::Vector3d(1e-30, 0, 0)).normalized()) *
+         Eigen::Translation3d(-kMiddle);
+}
+
+Result<VisitError> Estimate(const PointCloud& standing, const PointCloud& now) {
+  const VisitErrorOptions options;
+  return EstimateVisitError(SurfaceCells(standing, options.cells), now, options);
+}
+
+TEST(VisitError, IsFoundWhereAllMotionsAreSeen) {
+  const Eigen::Isometry3d taught_from_actual = Motion({0.008, -0.005, 0.006}, {3e-5, -2e-5, 4e-5});
+  const auto error = Estimate(Corner(1), Moved(Corner(2), taught_from_actual.inverse()));
+  ASSERT_TRUE(error.ok()) << error.error().message;
+  EXPECT_GT(error->cells, 3000U);
+  const double shift_mm = error->standard.head<3>().maxCoeff(),
+               turn_rad = error->standard.tail<3>().maxCoeff();
+  EXPECT_LT(shift_mm, 0.001);  // a fifth of the robot's
+  EXPECT_LT(turn_rad, 0.00001);
+  for (const Eigen::Vector3d& p : {kMiddle, Eigen::Vector3d(150, 100, 630), Eigen::Vector3d(-150, 0, 670)}) {
+    // Four of its own standard deviations; 50 mm: from the middle of what is seen to kMiddle, at most.
+    EXPECT_LT((error->taught_from_actual * p - taught_from_actual * p).norm(),
+              4 * (shift_mm + turn_rad * ((p - kMiddle).norm() + 50)));
+  }
+}
+
+TEST(VisitError, WhatNothingShowsStaysZero) {
+  const auto error = Estimate(Plane(1), Moved(Plane(2), Motion({0.01, 0.01, 0.01}, {0, 0, 0}).inverse()));
+  ASSERT_TRUE(error.ok()) << error.error().message;
+  const Eigen::Vector3d shift = error->taught_from_actual * kMiddle - kMiddle;
+  EXPECT_NEAR(shift.x(), 0, 1e-5);  // mm
+  EXPECT_NEAR(shift.y(), 0, 1e-5);
+  EXPECT_NEAR(shift.z(), 0.01, 0.0006);  // mm, 4 standard deviations
+  EXPECT_NEAR(error->standard[0], 0.005, 1e-5);
+  EXPECT_LT(error->standard[2], 0.0005);
+}
+
+TEST(VisitError, ALoneViewIsLeftAlone) {
+  const auto error = Estimate({}, Corner(1));
+  ASSERT_TRUE(error.ok());
+  EXPECT_EQ(error->cells, 0U);
+  EXPECT_TRUE(error->taught_from_actual.isApprox(Eigen::Isometry3d::Identity(), 1e-12));
+}
+
+TEST(VisitError, ThePartDoesNotCount) {
+  PointCloud now = Corner(2);
+  std::mt19937 random(3);
+  AddSquare(kMiddle + Eigen::Vector3d(0, 80, -0.4), Eigen::Vector3d(0, 0, -1), random, now);  // on a rest
+  AddSquare(kMiddle - Eigen::Vector3d(0, 0, 60), Eigen::Vector3d(0, 0, -1), random, now);
+  const auto error = Estimate(Corner(1), now);
+  ASSERT_TRUE(error.ok()) << error.error().message;
+  EXPECT_LT((error->taught_from_actual * kMiddle - kMiddle).norm(),
+            0.003);  // mm: a third of the places is lost
+}
+
+TEST(VisitError, AKnockIsNotCorrected) {
+  for (const double shift_mm : {0.08, 0.4}) {
+    const auto error = Estimate(Corner(1), Moved(Corner(2), Motion({0, 0, shift_mm}, {0, 0, 0})));
+    ASSERT_FALSE(error.ok()) << shift_mm;
+    EXPECT_THAT(error.error().message, HasSubstr("a knock"));
+  }
+}
+
+}  // namespace
+}  // namespace forgescan
