@@ -26,8 +26,8 @@ std::vector<std::uint32_t> FindInBox(const PointCloud& scan, const RegistrationM
       const Eigen::Vector3f off = motion.linear() * scan.points[i] + (motion.translation() - center);
       inside[count] = static_cast<std::uint32_t>(i);
       // A coordinate that is NaN fails the comparison.
-      count += static_cast<std::size_t>((std::abs(off.x()) <= half.x()) & (std::abs(off.y()) <= half.y()) &
-                                        (std::abs(off.z()) <= half.z()));
+      const auto is_within = [&](int axis) { return std::size_t{std::abs(off[axis]) <= half[axis]}; };
+      count += is_within(0) & is_within(1) & is_within(2);
     }
     inside.resize(count);
   });

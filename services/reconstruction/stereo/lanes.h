@@ -28,8 +28,8 @@ FORGESCAN_INLINE Floats LoadUpper(const std::uint16_t* at) {
   return (Floats)(__builtin_convertvector(upper, Ints) << 16);
 }
 // At any address. Not by memcpy, after which the compiler takes every pointer and number in memory for
-// changed.
-using LooseFloats = float __attribute__((vector_size(64), aligned(4)));
+// changed. A typedef, because clang overlooks the alignment in `using`.
+typedef float LooseFloats __attribute__((vector_size(64), aligned(4)));
 FORGESCAN_INLINE void Store(float* at, Floats value) { *reinterpret_cast<LooseFloats*>(at) = value; }
 FORGESCAN_INLINE Floats All(float value) { return value - Floats{}; }
 FORGESCAN_INLINE Floats LaneNumbers() { return Floats{0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15}; }
