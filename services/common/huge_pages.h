@@ -9,7 +9,7 @@
 
 namespace forgescan {
 
-// Reserves like std::vector::reserve, and asks for pages of 2 MB before anything is written: touching 4 kB
+// Reserves like std::vector::reserve, and asks for pages of 2 MB before anything new is written: touching 4 kB
 // pages for the first time takes longer than most of what is done with them, and looking them up is felt
 // every time. Advice only: where it is not taken nothing else changes.
 template <typename T>

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cstddef>
 
+#include "services/common/simd_target.h"
+
 namespace forgescan {
 namespace {
 
@@ -67,19 +69,16 @@ void JoinPlain(Rows rows, Out to) { JoinRows(rows, to); }
 void MarkPlain(In near, std::uint8_t border, Out cause) { MarkBytes(near, border, cause); }
 
 #if defined(__x86_64__)
-#if defined(__clang__)  // has no such preference
-#define FORGESCAN_AVX2 [[gnu::target("avx2")]]
-#define FORGESCAN_AVX512 [[gnu::target("avx512f,avx512bw,avx512vl,avx512dq")]]
-#else
-#define FORGESCAN_AVX2 [[gnu::target("avx2,prefer-vector-width=256")]]
-#define FORGESCAN_AVX512 [[gnu::target("avx512f,avx512bw,avx512vl,avx512dq,prefer-vector-width=512")]]
-#endif
-FORGESCAN_AVX2 void WidenAvx2(In in, int reach, Out out) { WidenBytes(in, reach, out); }
-FORGESCAN_AVX2 void JoinAvx2(Rows rows, Out to) { JoinRows(rows, to); }
-FORGESCAN_AVX2 void MarkAvx2(In near, std::uint8_t border, Out cause) { MarkBytes(near, border, cause); }
-FORGESCAN_AVX512 void WidenAvx512(In in, int reach, Out out) { WidenBytes(in, reach, out); }
-FORGESCAN_AVX512 void JoinAvx512(Rows rows, Out to) { JoinRows(rows, to); }
-FORGESCAN_AVX512 void MarkAvx512(In near, std::uint8_t border, Out cause) { MarkBytes(near, border, cause); }
+FORGESCAN_TARGET_AVX2 void WidenAvx2(In in, int reach, Out out) { WidenBytes(in, reach, out); }
+FORGESCAN_TARGET_AVX2 void JoinAvx2(Rows rows, Out to) { JoinRows(rows, to); }
+FORGESCAN_TARGET_AVX2 void MarkAvx2(In near, std::uint8_t border, Out cause) {
+  MarkBytes(near, border, cause);
+}
+FORGESCAN_TARGET_AVX512 void WidenAvx512(In in, int reach, Out out) { WidenBytes(in, reach, out); }
+FORGESCAN_TARGET_AVX512 void JoinAvx512(Rows rows, Out to) { JoinRows(rows, to); }
+FORGESCAN_TARGET_AVX512 void MarkAvx512(In near, std::uint8_t border, Out cause) {
+  MarkBytes(near, border, cause);
+}
 #endif
 
 }  // namespace

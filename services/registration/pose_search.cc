@@ -191,7 +191,7 @@ std::vector<Candidate> WithoutHopeless(std::vector<Candidate> candidates) {
   return candidates;
 }
 
-// Of the poses that pass RegisterScan, the one that scores best against every other.
+// Of the poses that pass RegisterScan, the one that none of those behind it scores better than.
 const Registration& BestOf(const ScanSample& sample, const RegistrationModel& model,
                            const std::vector<Registration>& passed, const IcpOptions& options) {
   const Registration* best = &passed.front();

@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core/eigen.hpp>
@@ -55,6 +56,7 @@ const Case& TheCase() {
 }
 
 double MedianSize(std::vector<double> values) {
+  if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::transform(values.begin(), values.end(), values.begin(), [](double value) { return std::abs(value); });
   std::nth_element(values.begin(), middle, values.end());

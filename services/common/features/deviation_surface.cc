@@ -83,7 +83,8 @@ struct DeviationQuery {
 
   struct Best {
     float squared;     // nothing beyond is of interest
-    float height = 0;  // over the plane of the nearest triangle
+    float held = 0;    // of the triangle that gives the sign: it and the nearest one are equally near
+    float height = 0;  // over its plane
     std::int32_t leaf = -1;
     int lane = 0;
   };
@@ -104,13 +105,15 @@ struct DeviationQuery {
     const float least = LeastOf(squared);
     if (!(least <= WithTies(best.squared))) return;
     // Of those that are equally near, the one that the point is highest over.
-    if (best.squared > WithTies(least)) best.leaf = -1;
     best.squared = least < best.squared ? least : best.squared;
-    alignas(32) float heights[8];
+    if (best.held > WithTies(best.squared)) best.leaf = -1;
+    alignas(32) float squares[8], heights[8];
+    *reinterpret_cast<Lanes*>(squares) = squared;
     *reinterpret_cast<Lanes*>(heights) = height;
     for (unsigned bits = Bits(squared <= WithTies(best.squared)); bits != 0; bits &= bits - 1) {
       const int lane = __builtin_ctz(bits);
       if (best.leaf < 0 || std::abs(heights[lane]) > std::abs(best.height)) {
+        best.held = squares[lane];
         best.height = heights[lane];
         best.leaf = number;
         best.lane = lane;
