@@ -120,6 +120,7 @@ class Measurer {
       Remark(fmt::format("two-point sizes are seen in {:.0f} % of the directions of the sections only",
                          100 * found.seen_share));
     }
+    const double noise_mm2 = TwoPointNoise(seen.points, fit, sizes);
     std::sort(sizes.begin(), sizes.end(), [](const auto& x, const auto& y) { return x.size_mm < y.size_mm; });
     if (spec.definition == SizeDefinition::kTwoPointMax) sizes.erase(sizes.begin(), sizes.end() - 1);
     if (spec.definition == SizeDefinition::kTwoPointMin) sizes.resize(1);
@@ -130,7 +131,7 @@ class Measurer {
           1.0 / static_cast<double>(size.first.size()) + 1.0 / static_cast<double>(size.second.size());
     }
     const auto count = static_cast<double>(sizes.size());
-    GatherTwoPoint(sizes, fit, seen);
+    GatherTwoPoint(sizes, fit, seen, noise_mm2);
     made_.definition = fmt::format("{} (ISO 14405-1): two-point size in {} sections",
                                    SizeDefinitionName(spec.definition), spec.sections_mm.size());
     made_.uncertainty_mm = fit.quality.sigma_mm * std::sqrt(variance) / count;
@@ -138,10 +139,11 @@ class Measurer {
   }
 
   // A local size contains the form of its place: there is no form that it misses.
-  void GatherTwoPoint(std::span<const TwoPointSize> sizes, const CylinderFit& fit, const FaceCloud& seen) {
+  void GatherTwoPoint(std::span<const TwoPointSize> sizes, const CylinderFit& fit, const FaceCloud& seen,
+                      double noise_mm2) {
     WeighedPoints weighed = WeighTwoPoint(seen.points, fit, sizes);
     weighed.views = seen.views;
-    sum_.Add(weighed, weighed, 0);
+    sum_.Add(weighed, noise_mm2);
     std::vector<double> residuals;
     for (const Eigen::Vector3d& p : seen.points) residuals.push_back(fit.Residual(p));
     CountShell(weighed.weights, residuals);
@@ -235,7 +237,7 @@ class Measurer {
   const FaceFits& fits_;
   const DimensionOptions& options_;
   InfluenceSum sum_;
-  double extreme_ = 0;  // see Influence
+  Extreme extreme_;
   DimensionMeasurement made_;
 };
 

@@ -16,14 +16,19 @@ struct ViewInfluence {
   double stretch_mm = 0;                              // mm per unit of scale about the model's origin
 };
 
+// The expected largest of the errors of many readings, in standard deviations of one; 0: there is no choice.
+struct Extreme {
+  double scatter = 0;  // of single points: every reading has its own
+  double patch = 0;    // of patches: neighbouring readings share it
+};
+
 struct Influence {
   std::vector<ViewInfluence> views;  // ascending
   double outward = 0;                // mm per mm by which every point lies too high over the surface
   double noise_mm = 0;  // standard uncertainty from errors of single points, of the size they scatter by
   double form_mm = 0;   // standard uncertainty from the form of what was not seen, or seen unevenly
   double patch = 0;     // mm per mm of error that a patch of one view shares, the patches being independent
-  double extreme = 0;  // expected largest of the readings the size was chosen from, in standard deviations of
-                       // one; 0: it was not chosen
+  Extreme extreme;      // of the readings the size was chosen from
 };
 
 }  // namespace forgescan

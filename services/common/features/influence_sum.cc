@@ -139,6 +139,12 @@ void InfluenceSum::Add(const WeighedPoints& seen, const WeighedPoints& ideal, do
   AddForm(seen, ideal, unknowns);
 }
 
+void InfluenceSum::Add(const WeighedPoints& seen, double noise_mm2) {
+  AddViews(seen);
+  AddPatches(seen);
+  AddNoise(seen, noise_mm2);
+}
+
 void InfluenceSum::AddViews(const WeighedPoints& seen) {
   for (std::size_t i = 0; i < seen.points.size(); ++i) {
     const std::uint16_t view = ViewOf(seen, i);
@@ -163,6 +169,10 @@ void InfluenceSum::AddPatches(const WeighedPoints& seen) {
   for (const auto& [key, weight] : patches) patch2_ += weight * weight;
 }
 
+void InfluenceSum::AddNoise(const WeighedPoints& seen, double noise_mm2) {
+  for (const double weight : seen.weights) noise_mm2_ += noise_mm2 * weight * weight;
+}
+
 void InfluenceSum::AddForm(const WeighedPoints& seen, const WeighedPoints& ideal, double unknowns) {
   std::map<Key, Cell> cells;
   for (std::size_t i = 0; i < seen.points.size(); ++i) {
@@ -174,7 +184,7 @@ void InfluenceSum::AddForm(const WeighedPoints& seen, const WeighedPoints& ideal
     cell.squares += seen.residuals[i] * seen.residuals[i];
   }
   const Scatter scatter = ScatterOf(cells, unknowns);
-  for (const double weight : seen.weights) noise_mm2_ += scatter.noise * weight * weight;
+  AddNoise(seen, scatter.noise);
   for (std::size_t i = 0; i < ideal.points.size(); ++i) {
     cells[CellOf(ideal.places[i], options_.form_cell_mm)].ideal += ideal.weights[i];
   }

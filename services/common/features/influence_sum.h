@@ -47,11 +47,14 @@ class InfluenceSum {
 
   // `ideal`: the same size's weights on an even cover of the whole face, true to the model; residuals unused.
   void Add(const WeighedPoints& seen, const WeighedPoints& ideal, double unknowns);
+  // A size that no unseen form moves; noise_mm2: the variance of a single point. Residuals are not used.
+  void Add(const WeighedPoints& seen, double noise_mm2);
   Influence Take() const;
 
  private:
   void AddViews(const WeighedPoints& seen);
   void AddPatches(const WeighedPoints& seen);
+  void AddNoise(const WeighedPoints& seen, double noise_mm2);
   void AddForm(const WeighedPoints& seen, const WeighedPoints& ideal, double unknowns);
 
   std::span<const Eigen::Vector3d> middles_;

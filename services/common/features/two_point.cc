@@ -32,6 +32,8 @@ struct Patch {
   double Radius() const { return sum / static_cast<double>(points.size()); }
 };
 
+double LargestOf(double count) { return std::sqrt(2 * std::log(std::max(1.0, count))); }
+
 }  // namespace
 
 TwoPointSizes MeasureTwoPoint(std::span<const Eigen::Vector3d> points, const CylinderFit& cylinder,
@@ -57,10 +59,25 @@ TwoPointSizes MeasureTwoPoint(std::span<const Eigen::Vector3d> points, const Cyl
   return result;
 }
 
-double ExpectedExtreme(const TwoPointSizes& found, double radius_mm, double patch_mm) {
+Extreme ExpectedExtreme(const TwoPointSizes& found, double radius_mm, double patch_mm) {
   const double pitch_mm = 2 * std::numbers::pi * radius_mm / kPatches;
-  const double own = static_cast<double>(found.sizes.size()) * std::min(1.0, pitch_mm / patch_mm);
-  return std::sqrt(2 * std::log(std::max(1.0, own)));
+  const auto count = static_cast<double>(found.sizes.size());
+  return {LargestOf(count), LargestOf(count * std::min(1.0, pitch_mm / patch_mm))};
+}
+
+double TwoPointNoise(std::span<const Eigen::Vector3d> points, const CylinderFit& cylinder,
+                     std::span<const TwoPointSize> sizes) {
+  double squares = 0, freedom = 0;
+  for (const TwoPointSize& size : sizes) {
+    for (const auto* patch : {&size.first, &size.second}) {
+      const auto count = static_cast<double>(patch->size());
+      double mean = 0;
+      for (const std::size_t i : *patch) mean += cylinder.Residual(points[i]) / count;
+      for (const std::size_t i : *patch) squares += std::pow(cylinder.Residual(points[i]) - mean, 2);
+      freedom += count - 1;
+    }
+  }
+  return squares / std::max(1.0, freedom);
 }
 
 WeighedPoints WeighTwoPoint(std::span<const Eigen::Vector3d> points, const CylinderFit& cylinder,
@@ -68,16 +85,11 @@ WeighedPoints WeighTwoPoint(std::span<const Eigen::Vector3d> points, const Cylin
   WeighedPoints result;
   result.points = points;
   result.weights.assign(points.size(), 0);
-  result.residuals.assign(points.size(), 0);
   for (const TwoPointSize& size : sizes) {
     for (const auto* patch : {&size.first, &size.second}) {
       const auto count = static_cast<double>(patch->size());
-      double mean = 0;
-      for (const std::size_t i : *patch) mean += cylinder.Residual(points[i]) / count;
       for (const std::size_t i : *patch) {
         result.weights[i] += 1 / (count * static_cast<double>(sizes.size()));
-        // Their squares are to add up to count times the variance.
-        result.residuals[i] = (cylinder.Residual(points[i]) - mean) * std::sqrt(count / (count - 1));
       }
     }
   }

@@ -29,12 +29,18 @@ TwoPointSizes MeasureTwoPoint(std::span<const Eigen::Vector3d> points, const Cyl
 
 // Purpose: how far errors alone are expected to push the largest of the sizes outwards, or the smallest
 // inwards, in standard deviations of one: at most sqrt(2 ln n) of n, dependent or not. Source: Boucheron,
-// Lugosi, Massart, Concentration Inequalities, 2013, Theorem 2.5. n: the sizes, of those nearer than patch_mm
-// around the section as many as have patches of their own. 0 for one size.
-double ExpectedExtreme(const TwoPointSizes& found, double radius_mm, double patch_mm);
+// Lugosi, Massart, Concentration Inequalities, 2013, Theorem 2.5. n: of the scatter all sizes; of the
+// patches, of sizes nearer than patch_mm around the section, as many as have patches of their own. 0 for n up
+// to 1.
+Extreme ExpectedExtreme(const TwoPointSizes& found, double radius_mm, double patch_mm);
 
-// Weights of the points in the mean of the sizes given. Residuals are those about the mean of their patch:
-// the form between patches is what a local size is there to show.
+// Purpose: variance of a single point about the mean of its patch, pooled over the patches of all sizes: the
+// points of two alone say little of it. The form between patches is what a local size is there to show.
+// Units: mm^2. 0 without sizes.
+double TwoPointNoise(std::span<const Eigen::Vector3d> points, const CylinderFit& cylinder,
+                     std::span<const TwoPointSize> sizes);
+
+// Weights of the points in the mean of the sizes given, without residuals.
 WeighedPoints WeighTwoPoint(std::span<const Eigen::Vector3d> points, const CylinderFit& cylinder,
                             std::span<const TwoPointSize> sizes);
 

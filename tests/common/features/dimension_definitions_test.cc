@@ -6,6 +6,7 @@
 #include <random>
 
 #include "services/common/features/dimensions.h"
+#include "services/common/features/two_point.h"
 #include "tests/common/shapes/test_axle.h"
 
 namespace forgescan {
@@ -109,10 +110,36 @@ TEST_F(DefinitionsTest, TwoPointSizesOfAnOvalCylinder) {
     EXPECT_EQ(lp.reason, "");
     EXPECT_LT(lp.standard_uncertainty_mm, 0.05);
     // 135 sizes, 3.1 mm apart around the section, and patches of 12 mm.
-    EXPECT_NEAR(lp.influence.extreme,
-                std::string(name) == "LP mean" ? 0 : std::sqrt(2 * std::log(135 * 3.09 / 12)), 0.001)
+    const double is_chosen = std::string(name) == "LP mean" ? 0 : 1;
+    EXPECT_NEAR(lp.influence.extreme.scatter, is_chosen * std::sqrt(2 * std::log(135)), 0.001) << name;
+    EXPECT_NEAR(lp.influence.extreme.patch, is_chosen * std::sqrt(2 * std::log(135 * 3.09 / 12)), 0.001)
         << name;
   }
+}
+
+// Three sizes within one patch of 12 mm: points of their own, but one error of the patch for all.
+TEST(TwoPointTest, NeighboursShareTheirPatchButNotTheirPoints) {
+  TwoPointSizes found;
+  found.sizes.resize(3);
+  const double kRounding = 1e-12;
+  EXPECT_NEAR(ExpectedExtreme(found, 44.25, 12).scatter, std::sqrt(2 * std::log(3)), kRounding);
+  EXPECT_EQ(ExpectedExtreme(found, 44.25, 12).patch, 0);
+  EXPECT_NEAR(ExpectedExtreme(found, 44.25, 1).patch, std::sqrt(2 * std::log(3)), kRounding);
+  found.sizes.clear();
+  EXPECT_EQ(ExpectedExtreme(found, 44.25, 1).scatter, 0);
+}
+
+// Two patches of three points, 1 mm apart and each uneven by 0.03 mm: 4 degrees of freedom.
+TEST(TwoPointTest, NoiseIsThatWithinThePatches) {
+  CylinderFit cylinder;
+  cylinder.axis = Eigen::Vector3d::UnitX();
+  cylinder.radius_mm = 44;
+  std::vector<Eigen::Vector3d> points;
+  for (const double off : {-0.03, 0.0, 0.03}) points.emplace_back(0, 44 + off, 0);
+  for (const double off : {-0.03, 0.0, 0.03}) points.emplace_back(0, -45 - off, 0);
+  const std::vector<TwoPointSize> sizes = {{89, 0, {0, 1, 2}, {3, 4, 5}}};
+  EXPECT_NEAR(TwoPointNoise(points, cylinder, sizes), 4 * 0.03 * 0.03 / 4, 1e-12);  // mm^2, rounding
+  EXPECT_EQ(TwoPointNoise(points, cylinder, {}), 0);
 }
 
 // Seen from above only, opposite points are rare: the size is told, with the share of directions.

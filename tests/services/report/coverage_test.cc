@@ -19,7 +19,8 @@ void ExpectCoverage(const std::vector<Coverage>& coverage, int parts) {
   for (const Coverage& c : coverage) {
     EXPECT_EQ(c.parts, parts) << c.name;
     EXPECT_GE(c.Share(), kStated - Reach(kStated, parts)) << c.name;
-    EXPECT_LE(c.Share(), std::min(1.0, kStated + Reach(kStated, parts))) << c.name;
+    // Beyond 1 for fewer than 227 parts: there the scatter against the stated tells of intervals too wide.
+    EXPECT_LE(c.Share(), kStated + Reach(kStated, parts)) << c.name;
   }
 }
 
@@ -95,7 +96,7 @@ TEST(CoverageTest, HoldsWhereErrorsGoTogetherOverOtherLengths) {
 }
 
 // Form alone: what is not seen of a cylinder is as uneven as what is, and its term is as large as the error.
-TEST(CoverageTest, TheFormOfWhatIsNotSeenIsNotTakenForLess) {
+TEST(CoverageTest, TheFormOfWhatIsNotSeenIsTakenForWhatItIs) {
   CoverageOptions options;
   options.budget = {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
   options.parts = 100;
@@ -105,7 +106,7 @@ TEST(CoverageTest, TheFormOfWhatIsNotSeenIsNotTakenForLess) {
   std::fputs(CoverageTable(*coverage).c_str(), stdout);
   for (const std::size_t diameter : {3U, 4U}) {
     // A scatter from 100 parts is uncertain by 7 %; three of it.
-    EXPECT_LT((*coverage)[diameter].scatter_mm / (*coverage)[diameter].stated_mm, 1.21);
+    EXPECT_NEAR((*coverage)[diameter].scatter_mm / (*coverage)[diameter].stated_mm, 1, 0.21);
   }
 }
 

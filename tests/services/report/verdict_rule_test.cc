@@ -145,16 +145,16 @@ TEST(Uncertainty, FollowsTheInfluenceOfTheViews) {
   EXPECT_NEAR(TermMm(terms, "temperature between views"), 50 * 2e-5 * std::sqrt(2.0), kRounding);
 }
 
-// The largest of readings with 0.003 and 0.004 mm of their own lies up to three of their sum of squares too
-// far out.
+// The largest of readings lies up to 4 of the 0.003 mm of their points and 2 of the 0.008 mm of their patches
+// too far out.
 TEST(Uncertainty, CountsThatASizeWasChosenAsAnExtreme) {
   Influence influence;
   influence.views.resize(1);
   influence.noise_mm = 0.003;
-  influence.patch = 0.4;
-  influence.extreme = 3;
+  influence.patch = 0.8;
+  influence.extreme = {.scatter = 4, .patch = 2};
   const auto terms = UncertaintyTerms({.patch_mm = 0.01}, influence, 100.0, 0.5);
-  EXPECT_NEAR(TermMm(terms, "extreme of many readings"), std::sqrt(3.0) * 0.005, 1e-12);  // mm, rounding
+  EXPECT_NEAR(TermMm(terms, "extreme of many readings"), 0.020 / std::sqrt(3.0), 1e-12);  // mm, rounding
 }
 
 TEST(Uncertainty, DefaultsOfTheAxleWithoutKnowledgeOfItsViews) {
