@@ -26,6 +26,11 @@ struct Matches {
   std::size_t far = 0;
 };
 
+// The weights divide by it.
+bool HasVariance(const SurfaceCell& cell) {
+  return std::isfinite(cell.variance_mm2) && cell.variance_mm2 > 0;
+}
+
 Matches Join(std::span<const SurfaceCell> standing, std::span<const SurfaceCell> now,
              const Eigen::Vector3d& pivot, const VisitErrorOptions& options) {
   Matches matches;
@@ -33,7 +38,8 @@ Matches Join(std::span<const SurfaceCell> standing, std::span<const SurfaceCell>
     const SurfaceCell &a = standing[i], &b = now[j];
     i += a.key <= b.key ? 1 : 0;
     j += b.key <= a.key ? 1 : 0;
-    if (a.key != b.key || a.normal.dot(b.normal) < options.min_cos_normals) {
+    if (a.key != b.key || !HasVariance(a) || !HasVariance(b) ||
+        a.normal.dot(b.normal) < options.min_cos_normals) {
       continue;
     }
     const Eigen::Vector3d normal = (a.normal + b.normal).normalized();
@@ -121,7 +127,7 @@ Result<VisitError> EstimateVisitError(std::span<const SurfaceCell> standing,
   }
   const double shift_mm = twist.head<3>().cwiseAbs().maxCoeff();
   const double turn_rad = twist.tail<3>().cwiseAbs().maxCoeff();
-  if (shift_mm > options.max_sigmas * options.robot_shift_mm ||
+  if (!twist.allFinite() || shift_mm > options.max_sigmas * options.robot_shift_mm ||
       turn_rad > options.max_sigmas * options.robot_turn_rad) {
     return Fail(ErrorCode::kUntrusted,
                 "the view is {:.3f} mm and {:.0f} urad off where it was taught, more than {} times what the "

@@ -37,7 +37,8 @@ struct VisitError {
 // distances along the mean normal of two cells, weighted by patches, Huber's weights beyond 3 sigma; the
 // robot's repeatability is the prior, so a motion that nothing shows stays zero. Frames: both of the camera.
 // Deterministic. Errors: kUntrusted if most of what stood still has moved, or the error is too large for the
-// robot: a knock, or the surroundings were moved. Cost: the sort of SurfaceCells.
+// robot: a knock, or the surroundings were moved. Cells without a finite variance above 0 do not count. Cost:
+// the sort of SurfaceCells.
 Result<VisitError> EstimateVisitError(std::span<const SurfaceCell> standing,
                                       const PointCloud& cloud_in_camera, const VisitErrorOptions& options);
 

@@ -9,8 +9,6 @@
 namespace forgescan {
 namespace {
 
-using Histogram = std::vector<long>;
-
 template <typename Pixel>
 void CountRows(const cv::Mat& frame, Histogram& histogram) {
   constexpr int kRows = 32;
@@ -45,31 +43,50 @@ Histogram Count(std::span<const cv::Mat> frames, const PatternSet& pattern, int 
   return sum;
 }
 
+constexpr int kBelow = 4;  // values that occur: 12-bit frames may hold multiples of 16 only
+
+struct Top {
+  int value = -1;
+  long count = 0;
+  long below = 0;  // of the next kBelow values, or fewer if there are no more
+  int below_count = 0;
+  long total = 0;
+};
+
+Top TopOf(const Histogram& histogram) {
+  Top top;
+  for (int value = static_cast<int>(histogram.size()) - 1; value >= 0; --value) {
+    const long count = histogram[static_cast<std::size_t>(value)];
+    top.total += count;
+    if (count > 0 && top.value < 0) {
+      top.value = value;
+      top.count = count;
+    } else if (count > 0 && top.below_count < kBelow) {
+      top.below += count;
+      ++top.below_count;
+    }
+  }
+  return top;
+}
+
+bool IsPile(const Top& top) {
+  constexpr double kMinShare = 1e-4;
+  constexpr double kMinExcess = 8;  // over the mean of the next lower values
+  return top.value >= 0 && static_cast<double>(top.count) >= kMinShare * static_cast<double>(top.total) &&
+         static_cast<double>(top.count) * kBelow >= kMinExcess * static_cast<double>(top.below);
+}
+
 }  // namespace
 
 std::optional<int> FindClippingLevel(std::span<const cv::Mat> frames, const PatternSet& pattern,
                                      int threads) {
-  constexpr double kMinShare = 1e-4;
-  constexpr double kMinExcess = 8;  // over the mean of the next lower values
-  constexpr int kBelow = 4;         // values that occur: 12-bit frames may hold multiples of 16 only
-  const Histogram histogram = Count(frames, pattern, threads);
-  long total = 0, below = 0, at_top = 0;
-  int top = -1, below_count = 0;
-  for (int value = static_cast<int>(histogram.size()) - 1; value >= 0; --value) {
-    const long count = histogram[static_cast<std::size_t>(value)];
-    total += count;
-    if (count > 0 && top < 0) {
-      top = value;
-      at_top = count;
-    } else if (count > 0 && below_count < kBelow) {
-      below += count;
-      ++below_count;
-    }
-  }
-  const bool is_cut = below_count == kBelow &&
-                      static_cast<double>(at_top) >= kMinShare * static_cast<double>(total) &&
-                      static_cast<double>(at_top) * kBelow >= kMinExcess * static_cast<double>(below);
-  return is_cut ? std::optional(top) : std::nullopt;
+  const Top top = TopOf(Count(frames, pattern, threads));
+  return top.below_count == kBelow && IsPile(top) ? std::optional(top.value) : std::nullopt;
+}
+
+std::optional<int> ReferenceClippingLevel(const Histogram& lit) {
+  const Top top = TopOf(lit);
+  return IsPile(top) ? std::optional(top.value) : std::nullopt;
 }
 
 }  // namespace forgescan

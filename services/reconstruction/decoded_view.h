@@ -50,7 +50,7 @@ struct DecodedView {
   float SigmaPx(int row, int column) const { return std::sqrt(FloatFromUpper(variance_px2(row, column))); }
   std::array<long, kMaskCauses> count{};  // pixels by cause; their sum is the image
   long repaired = 0;  // valid pixels whose fringe order was doubtful and came from their neighbours
-  std::optional<double> clipping_dn;  // where the camera cut off grey values, if below saturation_fraction
+  std::optional<double> clipping_dn;  // where the camera cut off the fringes, if below full scale
   double median_modulation_dn = 0;    // the least B of the frequencies, over valid pixels of a regular grid
   double median_sigma_px = 0;         // over the same pixels
 };

@@ -125,9 +125,10 @@ Result<DecodedView> FringeDecoder::Decode(std::span<const cv::Mat> frames) const
   ReconstructionConfig config = config_;
   if (const auto level = FindClippingLevel(frames, pattern_, config_.threads)) {
     const double clipping_dn = GreyScale(frames[0], config_) * *level;
-    if (clipping_dn < config_.saturation_fraction * kFullScaleDn) {
+    if (clipping_dn < kFullScaleDn) {
       view.clipping_dn = clipping_dn;
-      config.saturation_fraction = (1 - kRounding) * clipping_dn / kFullScaleDn;
+      config.saturation_fraction =
+          std::min(config.saturation_fraction, (1 - kRounding) * clipping_dn / kFullScaleDn);
     }
   }
   const std::vector<std::uint8_t> doubtful = DecodeRows(frames, config, view);

@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <cstdint>
 #include <numbers>
 #include <vector>
 
+#include "services/reconstruction/clipping.h"
 #include "services/reconstruction/histogram_median.h"
 #include "services/reconstruction/pixel_sampler.h"
 
@@ -102,13 +104,13 @@ double HarmonicGain(const FringeDecoder& decoder) {
 // Collects the figures pixel by pixel.
 class TrustSampler {
  public:
-  // clipping_dn: where the camera cuts off, if below full scale.
+  // cut_dn: where the camera cuts off.
   TrustSampler(std::span<const cv::Mat> frames, const FringeDecoder& decoder,
-               const ReconstructionConfig& config, const std::optional<double>& clipping_dn)
+               const ReconstructionConfig& config, double cut_dn)
       : pixel_(frames, decoder.estimator(), GreyScale(frames[0], config)),
         decoder_(decoder),
         noise_(config.noise),
-        uncut_dn_(kUncutShare * clipping_dn.value_or(kFullScaleDn)),
+        uncut_dn_(kUncutShare * cut_dn),
         errors_(decoder.estimator().cosine.rows()) {}
 
   void AddSaturated() { ++saturated_; }
@@ -150,7 +152,7 @@ class TrustSampler {
   }
 
  private:
-  static constexpr double kUncutShare = 0.98;  // of full scale: a brighter reference may be saturated
+  static constexpr double kUncutShare = 0.98;  // of cut_dn: a brighter reference may be cut off
   static constexpr double kBlackDn = 2;        // a darker one may lie below what the camera shows
 
   // The reference shows the background at its own time, the fringes at theirs.
@@ -239,22 +241,48 @@ bool IsLit(MaskCause cause) {
   return cause != MaskCause::kSaturated && cause != MaskCause::kLowModulation && cause != MaskCause::kNoisy;
 }
 
+// visit(row, column, cause) on a regular grid.
+template <typename Visit>
+void ForSamples(const DecodedView& view, const Visit& visit) {
+  const int step = SamplingStep(view.cause.size());
+  for (int row = step / 2; row < view.cause.rows; row += step) {
+    for (int column = step / 2; column < view.cause.cols; column += step) {
+      visit(row, column, static_cast<MaskCause>(view.cause(row, column)));
+    }
+  }
+}
+
+// Where the camera cuts off, by the fringes or by the reference frame: full scale if nothing shows it.
+double CutDn(std::span<const cv::Mat> frames, const DecodedView& view, const PatternSet& pattern,
+             const ReconstructionConfig& config) {
+  const double fringes_dn = view.clipping_dn.value_or(kFullScaleDn);
+  if (!pattern.reference_frame_index) {
+    return fringes_dn;
+  }
+  const cv::Mat& reference = frames[static_cast<std::size_t>(*pattern.reference_frame_index)];
+  const bool is_narrow = reference.depth() == CV_8U;
+  Histogram lit(is_narrow ? 256 : 65536);
+  ForSamples(view, [&](int row, int column, MaskCause cause) {
+    if (IsLit(cause)) {
+      ++lit[is_narrow ? reference.at<std::uint8_t>(row, column) : reference.at<std::uint16_t>(row, column)];
+    }
+  });
+  const auto level = ReferenceClippingLevel(lit);
+  return level ? std::min(fringes_dn, GreyScale(reference, config) * *level) : fringes_dn;
+}
+
 }  // namespace
 
 Result<TrustFigures> MeasureTrust(std::span<const cv::Mat> frames, const DecodedView& view,
                                   const FringeDecoder& decoder, const ReconstructionConfig& config) {
-  const int step = SamplingStep(view.cause.size());
-  TrustSampler sampler(frames, decoder, config, view.clipping_dn);
-  for (int row = step / 2; row < view.cause.rows; row += step) {
-    for (int column = step / 2; column < view.cause.cols; column += step) {
-      const auto cause = static_cast<MaskCause>(view.cause(row, column));
-      if (cause == MaskCause::kSaturated) {
-        sampler.AddSaturated();
-      } else if (IsLit(cause)) {
-        sampler.Add(row, column, static_cast<double>(view.coordinate_px(row, column)));
-      }
+  TrustSampler sampler(frames, decoder, config, CutDn(frames, view, decoder.pattern(), config));
+  ForSamples(view, [&](int row, int column, MaskCause cause) {
+    if (cause == MaskCause::kSaturated) {
+      sampler.AddSaturated();
+    } else if (IsLit(cause)) {
+      sampler.Add(row, column, static_cast<double>(view.coordinate_px(row, column)));
     }
-  }
+  });
   ASSIGN_OR_RETURN(auto figures, sampler.Finish());
   constexpr double kMinGain = 0.1;  // below it the frames cancel the 2nd harmonic
   if (const double gain = HarmonicGain(decoder); gain > kMinGain) {

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <random>
 
 namespace forgescan {
@@ -105,6 +107,39 @@ TEST(VisitError, ThePartDoesNotCount) {
   ASSERT_TRUE(error.ok()) << error.error().message;
   EXPECT_LT((error->taught_from_actual * kMiddle - kMiddle).norm(),
             0.003);  // mm: a third of the places is lost
+}
+
+TEST(VisitError, CellsWithoutAVarianceDoNotCount) {
+  const VisitErrorOptions options;
+  const auto standing = SurfaceCells(Corner(1), options.cells);
+  const PointCloud now = Corner(2);
+  const auto whole = EstimateVisitError(standing, now, options);
+  ASSERT_TRUE(whole.ok()) << whole.error().message;
+  for (const double sigma_mm : {std::nan(""), HUGE_VAL}) {
+    PointCloud with_one = now;  // a point in the middle of the first square
+    with_one.sigma_mm[now.size() / 6] = static_cast<float>(sigma_mm);
+    const auto error = EstimateVisitError(standing, with_one, options);
+    ASSERT_TRUE(error.ok()) << error.error().message;
+    EXPECT_EQ(error->cells, whole->cells - 1);
+    // mm: one cell of thousands
+    EXPECT_LT((error->taught_from_actual * kMiddle - whole->taught_from_actual * kMiddle).norm(), 1e-5);
+    EXPECT_TRUE(error->standard.allFinite());
+  }
+  PointCloud exact = now;
+  std::fill(exact.sigma_mm.begin(), exact.sigma_mm.end(), 0.0F);
+  const auto none = EstimateVisitError(standing, exact, options);
+  ASSERT_TRUE(none.ok()) << none.error().message;
+  EXPECT_EQ(none->cells, 0U);
+  EXPECT_TRUE(none->taught_from_actual.isApprox(Eigen::Isometry3d::Identity(), 1e-12));
+}
+
+TEST(VisitError, AnErrorThatIsNoNumberIsRefused) {
+  const VisitErrorOptions options;
+  auto standing = SurfaceCells(Corner(1), options.cells);
+  for (SurfaceCell& cell : standing) cell.point.z() = std::nan("");
+  const auto error = EstimateVisitError(standing, Corner(2), options);
+  ASSERT_FALSE(error.ok());
+  EXPECT_EQ(error.error().code, ErrorCode::kUntrusted);
 }
 
 TEST(VisitError, AKnockIsNotCorrected) {

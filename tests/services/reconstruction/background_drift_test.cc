@@ -160,12 +160,14 @@ TEST(BackgroundDrift, IsMeasuredInEveryViewAndRefusedWhereTheBackgroundIsShared)
   }
 }
 
-// A drift that is large enough to be refused must not pass because nothing shows it.
+// A drift that is large enough to be refused must not pass because nothing shows it. The fringes end at 160
+// DN, so a cut between that and full scale shows in the reference frame alone.
 TEST(BackgroundDrift, IsNotJudgedByAReferenceThatIsCutOff) {
   const PatternSet shared = StationPattern(Background::kShared);
-  for (const Cut& cut : {Cut{255, 1}, Cut{0, 1}, Cut{255, 0.6}, Cut{0, 0.6}}) {
+  for (const Cut& cut : {Cut{255, 1}, Cut{0, 1}, Cut{255, 0.6}, Cut{0, 0.6}, Cut{150, 1}, Cut{168, 1},
+                         Cut{200, 0.6}, Cut{245, 1}, Cut{246, 0.6}}) {
     SCOPED_TRACE(cut.dn);
-    for (const double drift_dn : {0.0, 1.0}) {
+    for (const double drift_dn : {0.0, 0.4, 1.0}) {
       const Trial trial = Try(shared, drift_dn, 50, cut);
       ASSERT_FALSE(trial.verdict.ok());
       EXPECT_EQ(trial.verdict.error().code, ErrorCode::kUntrusted);

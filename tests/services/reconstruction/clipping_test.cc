@@ -5,6 +5,10 @@
 #include <algorithm>
 #include <cmath>
 #include <opencv2/core.hpp>
+#include <utility>
+
+#include "services/reconstruction/fringe_decoder.h"
+#include "tests/services/reconstruction/phase_scene.h"
 
 namespace forgescan {
 namespace {
@@ -46,6 +50,40 @@ TEST(Clipping, NeitherHotPixelsNorConstantFramesNorTheWhiteFrameAreACut) {
   with_white.emplace_back(200, 300, CV_8U, cv::Scalar(200));
   pattern.reference_frame_index = 1;
   EXPECT_FALSE(FindClippingLevel(with_white, pattern, 1).has_value());
+}
+
+TEST(Clipping, ALevelBetweenTheLimitOfSaturationAndFullScaleIsKept) {
+  const PatternSet pattern = StationPattern(Background::kShared);
+  ReconstructionConfig config;  // saturated above 242.25 DN
+  config.noise = {.read_noise_dn = 1, .gain_dn = 0};
+  Columns columns(120, 300);
+  cv::RNG(7).fill(columns, cv::RNG::UNIFORM, 100.0, 1800.0);
+  auto frames = RenderColumns(columns, pattern, {.background_dn = 170, .modulation_dn = 80});
+  const auto decoder = FringeDecoder::Create(pattern, config);
+  EXPECT_FALSE(decoder->Decode(frames)->clipping_dn.has_value());  // at full scale
+  for (cv::Mat& frame : frames) {
+    frame = cv::min(frame, 245);
+  }
+  EXPECT_NEAR(decoder->Decode(frames)->clipping_dn.value(), 245, 0.01);  // DN, single precision
+}
+
+TEST(Clipping, OfTheReferenceIsAPileAtItsTopOrOneValue) {
+  Histogram lit(256);
+  EXPECT_FALSE(ReferenceClippingLevel(lit).has_value());  // nothing lit
+  for (int value = 150; value <= 200; ++value) {
+    lit[static_cast<std::size_t>(value)] = 100;
+  }
+  EXPECT_FALSE(ReferenceClippingLevel(lit).has_value());
+  lit[200] = 5000;
+  EXPECT_EQ(ReferenceClippingLevel(lit), 200);
+  Histogram plain(256);
+  plain[168] = 20000;
+  EXPECT_EQ(ReferenceClippingLevel(plain), 168);
+  for (const auto& [value, count] :
+       {std::pair(166, 1500), {167, 7000}, {168, 9000}, {169, 2300}, {170, 200}}) {
+    plain[static_cast<std::size_t>(value)] = count;  // flat, but with noise
+  }
+  EXPECT_FALSE(ReferenceClippingLevel(plain).has_value());
 }
 
 }  // namespace

@@ -150,8 +150,9 @@ Result<StandingSurfaces> VirtualInspection::ScanWithout(PartState part,
   StandingSurfaces standing;
   for (const ViewState& view : views) {
     const Result<ViewCloud> scan = Scan(part, view);
-    // Refused: too little stands still in this view's sight.
-    if (!scan.ok() && scan.error().code != ErrorCode::kUntrusted) {
+    // Refused, or not a pixel lit: too little stands still in this view's sight.
+    if (!scan.ok() && scan.error().code != ErrorCode::kUntrusted &&
+        scan.error().code != ErrorCode::kDegenerate) {
       return scan.error();
     }
     standing.push_back(scan.ok() ? SurfaceCells(scan->cloud_in_camera, VisitErrorOptions().cells)
