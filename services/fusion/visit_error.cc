@@ -1,9 +1,10 @@
 #include "services/fusion/visit_error.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <vector>
+
+#include "services/common/geometry/dense_solvers.h"
 
 namespace forgescan {
 namespace {
@@ -123,7 +124,7 @@ Result<VisitError> EstimateVisitError(std::span<const SurfaceCell> standing,
   Vector6 twist = Vector6::Zero();
   for (int step = 0; step < kSteps; ++step) {
     const System system = Build(matches.near, twist, options);
-    twist = system.information.ldlt().solve(system.right_side);
+    twist = SolvePositive(system.information, system.right_side);
   }
   const double shift_mm = twist.head<3>().cwiseAbs().maxCoeff();
   const double turn_rad = twist.tail<3>().cwiseAbs().maxCoeff();
@@ -134,8 +135,7 @@ Result<VisitError> EstimateVisitError(std::span<const SurfaceCell> standing,
                 "robot scatters: a knock, or what stood still was moved",
                 shift_mm, 1e6 * turn_rad, options.max_sigmas);
   }
-  const Matrix6 covariance =
-      Build(matches.near, twist, options).information.ldlt().solve(Matrix6::Identity());
+  const Matrix6 covariance = InverseOf(Build(matches.near, twist, options).information);
   return VisitError{MotionOf(twist, pivot), covariance.diagonal().cwiseSqrt(), matches.near.size()};
 }
 

@@ -1,9 +1,10 @@
 #include "services/reconstruction/phase_estimator.h"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+
+#include "services/common/geometry/dense_solvers.h"
 
 namespace forgescan {
 namespace {
@@ -90,15 +91,13 @@ Result<PhaseEstimator> MakePhaseEstimator(const PatternSet& pattern) {
   const int frequencies = static_cast<int>(pattern.frequencies.size());
   const int backgrounds = pattern.background == Background::kShared ? 1 : frequencies;
   const Eigen::MatrixXd design = DesignMatrix(pattern, backgrounds);
-  Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver;
-  solver.setThreshold(1e-3);  // shifts nearer to singular than this would multiply the noise by hundreds
-  solver.compute(design);
-  if (solver.rank() < design.cols()) {
+  constexpr double kSingular = 1e-3;  // shifts nearer to it would multiply the noise by hundreds
+  const auto [solution, rank] = PseudoInverseOf(design, kSingular);
+  if (rank < design.cols()) {
     return Fail(ErrorCode::kDegenerate,
                 "the shifts of the pattern set do not determine its {} unknowns (rank {})", design.cols(),
-                solver.rank());
+                rank);
   }
-  const Eigen::MatrixXd solution = solver.pseudoInverse();
   PhaseEstimator estimator;
   estimator.cosine.resize(frequencies, pattern.frame_count());
   estimator.sine.resize(frequencies, pattern.frame_count());

@@ -1,9 +1,11 @@
 #include "services/reconstruction/projector_consistency.h"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <vector>
+
+#include "services/common/geometry/dense_solvers.h"
 
 namespace forgescan {
 namespace {
@@ -39,11 +41,10 @@ double KeptRms(const Eigen::ArrayXd& residual) {
 
 Eigen::VectorXd Solve(const Eigen::MatrixXd& columns, const Eigen::ArrayXd& wanted,
                       const Eigen::ArrayXd& weight) {
+  constexpr double kFree = 1e-9;  // a flat scene leaves unknowns free: the least solution of all then
   const Eigen::MatrixXd weighted = weight.matrix().asDiagonal() * columns;
-  Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver;
-  solver.setThreshold(1e-9);  // a flat scene leaves unknowns free: the least solution of all then
-  solver.compute(weighted.transpose() * weighted);
-  return solver.solve(weighted.transpose() * (weight * wanted).matrix());
+  return LeastNormSolution(weighted.transpose() * weighted, weighted.transpose() * (weight * wanted).matrix(),
+                           kFree);
 }
 
 // u = (1, h) . a / (1 + h . b): the residuals of the best a and b.

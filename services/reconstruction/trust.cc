@@ -1,6 +1,6 @@
 #include "services/reconstruction/trust.h"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <complex>
@@ -8,6 +8,7 @@
 #include <numbers>
 #include <vector>
 
+#include "services/common/geometry/dense_solvers.h"
 #include "services/reconstruction/clipping.h"
 #include "services/reconstruction/histogram_median.h"
 #include "services/reconstruction/pixel_sampler.h"
@@ -212,7 +213,8 @@ class TrustSampler {
     const bool visible = normal_.trace() / 2 > kMinVisible * modulation_square_;
     double explained = 0;
     if (visible) {
-      const Eigen::Vector2d ratio = normal_.completeOrthogonalDecomposition().solve(right_side_);
+      constexpr double kFree = 1e-12;  // of a set that shows one of the two parts only
+      const Eigen::Vector2d ratio = LeastNormSolution(normal_, right_side_, kFree);
       figures.second_harmonic_ratio = ratio.norm();
       explained = ratio.dot(right_side_);
     }

@@ -1,11 +1,11 @@
 #include "services/registration/pose_search.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <numbers>
 #include <numeric>
 #include <optional>
 
+#include "services/common/geometry/dense_solvers.h"
 #include "services/common/parallel_blocks.h"
 #include "services/registration/correspondences.h"
 #include "services/registration/icp_stages.h"
@@ -42,7 +42,7 @@ PrincipalFrame PrincipalFrameOf(const std::vector<Eigen::Vector3f>& points) {
     const Eigen::Vector3d arm = p.cast<double>() - frame.center;
     spread += arm * arm.transpose();
   }
-  frame.axes = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvectors().rowwise().reverse();
+  frame.axes = EigensystemOf(spread).vectors.rowwise().reverse();
   if (frame.axes.determinant() < 0) frame.axes.col(2) *= -1;
   return frame;
 }

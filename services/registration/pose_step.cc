@@ -1,8 +1,8 @@
 #include "services/registration/pose_step.h"
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
 
+#include "services/common/geometry/dense_solvers.h"
 #include "services/common/parallel_blocks.h"
 
 namespace forgescan {
@@ -82,17 +82,16 @@ Result<PoseStep> SolveStep(const std::vector<Pair>& pairs, const StepFrame& fram
   if (static_cast<double>(sum.pairs) < kUnknowns) {
     return Fail(ErrorCode::kDegenerate, "{} point pairs are left, a pose needs at least 6", sum.pairs);
   }
-  const Eigen::SelfAdjointEigenSolver<Matrix6> eigen(sum.information / sum.weight);
-  const double weakest = eigen.eigenvalues()[0];
+  const auto [eigenvalues, motions] = EigensystemOf(sum.information / sum.weight);
+  const double weakest = eigenvalues[0];
   if (!(weakest >= guard.min_eigenvalue)) {
     return Fail(
         ErrorCode::kDegenerate,
         "the points do not fix the pose: {} is held with an eigenvalue of {:.2g}, at least {:.2g} is needed",
-        NameOfMotion(eigen.eigenvectors().col(0), frame), weakest, guard.min_eigenvalue);
+        NameOfMotion(motions.col(0), frame), weakest, guard.min_eigenvalue);
   }
-  const Matrix6 inverse = eigen.eigenvectors() *
-                          (eigen.eigenvalues().array() + guard.damping).inverse().matrix().asDiagonal() *
-                          eigen.eigenvectors().transpose() / sum.weight;
+  const Matrix6 inverse = motions * (eigenvalues.array() + guard.damping).inverse().matrix().asDiagonal() *
+                          motions.transpose() / sum.weight;
   const Vector6 step = -inverse * sum.gradient;
   PoseStep result;
   result.moved_from_before = ExactMotion(step, frame);
@@ -100,7 +99,7 @@ Result<PoseStep> SolveStep(const std::vector<Pair>& pairs, const StepFrame& fram
   result.translation_mm = step.tail<3>().norm();
   result.rms_mm = std::sqrt(sum.squares / sum.weight);
   for (int i = 0; i < 6; ++i) {
-    result.motions[static_cast<std::size_t>(i)] = {eigen.eigenvectors().col(i), eigen.eigenvalues()[i]};
+    result.motions[static_cast<std::size_t>(i)] = {motions.col(i), eigenvalues[i]};
   }
   Vector6 units;
   units << frame.reach_mm.cwiseInverse(), Eigen::Vector3d::Ones();

@@ -1,9 +1,9 @@
 #include "services/common/features/cone_fit.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
-#include <Eigen/LU>
 #include <numbers>
+
+#include "services/common/geometry/dense_solvers.h"
 
 namespace forgescan {
 namespace {
@@ -41,10 +41,10 @@ class ConeModel {
 
   Result<double> Move(const NormalSums<6>& sums) {
     if (sums.used < 6) return Fail(ErrorCode::kDegenerate, "{} points are left, a cone needs 6", sums.used);
-    const Eigen::SelfAdjointEigenSolver<Matrix6> eigen(sums.normal, Eigen::EigenvaluesOnly);
-    if (!(eigen.eigenvalues()[0] > kWeakShare * eigen.eigenvalues()[5])) return NoCone(sums.used);
+    const Vector6 eigenvalues = EigenvaluesOf(sums.normal);
+    if (!(eigenvalues[0] > kWeakShare * eigenvalues[5])) return NoCone(sums.used);
     const Eigen::Matrix3d axes = Frame().axes;
-    const Matrix6 inverse = sums.normal.inverse();
+    const Matrix6 inverse = InverseOf(sums.normal);
     const Vector6 move = inverse * sums.right;
     fit_.axis_point += axes.leftCols<2>() * move.head<2>();
     fit_.axis = (fit_.axis + axes.leftCols<2>() * move.segment<2>(2) / half_length_mm_).normalized();

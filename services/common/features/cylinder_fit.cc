@@ -1,11 +1,12 @@
 #include "services/common/features/cylinder_fit.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <numbers>
+
+#include "services/common/geometry/dense_solvers.h"
 
 namespace forgescan {
 namespace {
@@ -65,10 +66,10 @@ class CylinderModel {
   Result<double> Move(const NormalSums<5>& sums) {
     if (sums.used < 5)
       return Fail(ErrorCode::kDegenerate, "{} points are left, a cylinder needs 5", sums.used);
-    const Eigen::SelfAdjointEigenSolver<Matrix5> eigen(sums.normal, Eigen::EigenvaluesOnly);
-    if (!(eigen.eigenvalues()[0] > kWeakShare * eigen.eigenvalues()[4])) return NoCylinder(sums.used);
+    const Vector5 eigenvalues = EigenvaluesOf(sums.normal);
+    if (!(eigenvalues[0] > kWeakShare * eigenvalues[4])) return NoCylinder(sums.used);
     const Eigen::Matrix3d axes = Frame().axes;
-    const Matrix5 inverse = sums.normal.inverse();
+    const Matrix5 inverse = InverseOf(sums.normal);
     const Vector5 move = inverse * sums.right;
     fit_.axis_point += axes.leftCols<2>() * move.head<2>();
     fit_.axis = (fit_.axis + axes.leftCols<2>() * move.segment<2>(2) / half_length_mm_).normalized();

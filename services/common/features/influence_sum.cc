@@ -6,6 +6,8 @@
 #include <array>
 #include <cmath>
 
+#include "services/common/geometry/dense_solvers.h"
+
 namespace forgescan {
 namespace {
 
@@ -103,7 +105,7 @@ WeighedPoints WeighDiameter(std::span<const Eigen::Vector3d> points, const Cylin
   if (cylinder.axis_constrained) {
     of_diameter << 0, 0, 0, 0, 2 / normal(4, 4);
   } else {
-    of_diameter = 2 * normal.inverse().col(4);
+    of_diameter = 2 * InverseOf(normal).col(4);
   }
   for (const Vector5& row : rows) result.weights.push_back(of_diameter.dot(row));
   return result;

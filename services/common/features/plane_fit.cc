@@ -1,8 +1,9 @@
 #include "services/common/features/plane_fit.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
+
+#include "services/common/geometry/dense_solvers.h"
 
 namespace forgescan {
 namespace {
@@ -31,11 +32,10 @@ class PlaneModel {
     for (const Eigen::Vector3d& p : points) {
       scatter += (p - plane.frame_.origin) * (p - plane.frame_.origin).transpose();
     }
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(scatter);
-    RETURN_IF_ERROR(CheckSpread(eigen.eigenvalues()[1], eigen.eigenvalues()[2], points.size()));
-    plane.frame_.axes << eigen.eigenvectors().col(2), eigen.eigenvectors().col(1),
-        eigen.eigenvectors().col(0);
-    plane.size_mm_ = std::sqrt(eigen.eigenvalues()[2] / static_cast<double>(points.size()));
+    const auto [spread, axes] = EigensystemOf(scatter);
+    RETURN_IF_ERROR(CheckSpread(spread[1], spread[2], points.size()));
+    plane.frame_.axes << axes.col(2), axes.col(1), axes.col(0);
+    plane.size_mm_ = std::sqrt(spread[2] / static_cast<double>(points.size()));
     return plane;
   }
 
@@ -53,9 +53,9 @@ class PlaneModel {
     const auto count = static_cast<double>(sums.used);
     const Eigen::Vector2d mean = sums.normal.block<2, 1>(1, 0) / count;
     scatter_ = sums.normal.block<2, 2>(1, 1) - count * mean * mean.transpose();
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(scatter_, Eigen::EigenvaluesOnly);
-    RETURN_IF_ERROR(CheckSpread(eigen.eigenvalues()[0], eigen.eigenvalues()[1], sums.used));
-    narrow_mm_ = std::sqrt(eigen.eigenvalues()[0] / count) * size_mm_;
+    const Eigen::Vector2d spread = EigenvaluesOf(scatter_);
+    RETURN_IF_ERROR(CheckSpread(spread[0], spread[1], sums.used));
+    narrow_mm_ = std::sqrt(spread[0] / count) * size_mm_;
     const Eigen::Vector2d right = sums.right.tail<2>() - mean * sums.right[0];
     const Eigen::Vector2d turn = scatter_.inverse() * right;
     frame_.origin +=

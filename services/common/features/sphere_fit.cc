@@ -1,10 +1,10 @@
 #include "services/common/features/sphere_fit.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+
+#include "services/common/geometry/dense_solvers.h"
 
 namespace forgescan {
 namespace {
@@ -29,7 +29,7 @@ Result<SphereFit> AlgebraicStart(Points points) {
     normal += row * row.transpose();
     right += row * q.squaredNorm();
   }
-  const Eigen::Vector4d x = normal.ldlt().solve(right);
+  const Eigen::Vector4d x = SolvePositive(normal, right);
   SphereFit sphere;
   sphere.center = centroid + x.head<3>();
   sphere.radius_mm = std::sqrt(x[3] + x.head<3>().squaredNorm());
@@ -56,8 +56,8 @@ class SphereModel {
 
   Result<double> Move(const NormalSums<4>& sums) {
     if (sums.used < 4) return Fail(ErrorCode::kDegenerate, "fewer than 4 points are left for a sphere");
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> eigen(sums.normal, Eigen::EigenvaluesOnly);
-    if (!(eigen.eigenvalues()[0] > kFlatShare * eigen.eigenvalues()[3])) {
+    const Eigen::Vector4d eigenvalues = EigenvaluesOf(sums.normal);
+    if (!(eigenvalues[0] > kFlatShare * eigenvalues[3])) {
       return Fail(ErrorCode::kDegenerate, "{} points do not fix a sphere: the cap is too flat", sums.used);
     }
     fit_.covariance = sums.normal.inverse();
