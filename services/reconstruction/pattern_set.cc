@@ -4,12 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <initializer_list>
 #include <numbers>
 #include <set>
-#include <sstream>
 #include <utility>
+
+#include "services/common/config/toml_text.h"
+#include "services/common/input_file.h"
 
 namespace forgescan {
 namespace {
@@ -31,6 +32,16 @@ Result<T> Read(const toml::table& table, std::string_view key, const std::string
     return Fail(ErrorCode::kFormat, "{}: the key {} is missing or of the wrong type", where, key);
   }
   return *value;
+}
+
+// Of another number toml++ would make a whole one by a cast that is undefined for large ones.
+template <>
+Result<int> Read<int>(const toml::table& table, std::string_view key, const std::string& where) {
+  const auto value = table[key].value_exact<std::int64_t>();
+  if (!value || !std::in_range<int>(*value)) {
+    return Fail(ErrorCode::kFormat, "{}: the key {} is missing or not a whole number", where, key);
+  }
+  return static_cast<int>(*value);
 }
 
 Result<double> ReadOr(const toml::table& table, std::string_view key, double otherwise,
@@ -201,6 +212,7 @@ Status Check(const PatternSet& pattern) {
 }
 
 Result<PatternSet> ParsePatternSet(std::string_view toml_text, const std::string& name) {
+  RETURN_IF_ERROR(CheckTomlText(toml_text, name));
   try {
     ASSIGN_OR_RETURN(auto pattern, ReadPatternSet(toml::parse(toml_text), name));
     if (const Status status = Check(pattern); !status.ok()) {
@@ -213,13 +225,8 @@ Result<PatternSet> ParsePatternSet(std::string_view toml_text, const std::string
 }
 
 Result<PatternSet> LoadPatternSet(const std::filesystem::path& path) {
-  std::ifstream file(path);
-  if (!file) {
-    return Fail(ErrorCode::kNotFound, "{}: the pattern file cannot be opened", path.string());
-  }
-  std::ostringstream text;
-  text << file.rdbuf();
-  return ParsePatternSet(text.str(), path.string());
+  ASSIGN_OR_RETURN(const std::string text, ReadInputFile(path));
+  return ParsePatternSet(text, path.string());
 }
 
 }  // namespace forgescan

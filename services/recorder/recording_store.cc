@@ -1,7 +1,5 @@
 #include "services/recorder/recording_store.h"
 
-#include <fcntl.h>
-#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -18,26 +16,14 @@ namespace fs = std::filesystem;
 
 constexpr const char* kFolders[] = {"parts", "station"};
 
-Result<std::shared_ptr<const int>> Lock(const std::string& folder) {
-  const std::string path = (fs::path(folder) / "recorder.lock").string();
-  const int fd = open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
-  if (fd < 0) {
-    return Fail(ErrorCode::kIo, "the recordings cannot be kept in {}: {} cannot be made ({})", folder, path,
-                std::strerror(errno));
+Result<std::shared_ptr<const OwnedFd>> Lock(const std::string& folder) {
+  auto file = LockFile((fs::path(folder) / "recorder.lock").string());
+  if (file.ok()) {
+    return std::make_shared<const OwnedFd>(std::move(*file));
   }
-  std::shared_ptr<const int> lock(new int(fd), [](const int* held) {
-    close(*held);
-    delete held;
-  });
-  if (flock(fd, LOCK_EX | LOCK_NB) != 0) {
-    return errno == EWOULDBLOCK
-               ? Fail(ErrorCode::kUnavailable,
-                      "the recordings cannot be kept in {}: another recorder keeps its recordings there",
-                      folder)
-               : Fail(ErrorCode::kIo, "the recordings cannot be kept in {}: {} cannot be locked ({})", folder,
-                      path, std::strerror(errno));
-  }
-  return lock;
+  const bool held = file.error().code == ErrorCode::kUnavailable;
+  return Fail(file.error().code, "the recordings cannot be kept in {}: {}", folder,
+              held ? "another recorder keeps its recordings there" : file.error().message);
 }
 
 // Each folder may be on a disk of its own.

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "services/common/locked_file.h"
 #include "services/common/result.h"
 #include "services/recorder/recording_name.h"
 #include "services/recorder/retention.h"
@@ -36,11 +37,11 @@ class RecordingStore {
                      std::int64_t now_us) const;
 
  private:
-  RecordingStore(std::string folder, std::shared_ptr<const int> lock)
+  RecordingStore(std::string folder, std::shared_ptr<const OwnedFd> lock)
       : folder_(std::move(folder)), lock_(std::move(lock)) {}
 
   std::string folder_;
-  std::shared_ptr<const int> lock_;  // a file descriptor
+  std::shared_ptr<const OwnedFd> lock_;
 };
 
 }  // namespace forgescan

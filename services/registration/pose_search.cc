@@ -217,15 +217,6 @@ std::vector<Eigen::Isometry3d> RivalsOf(const RivalSearch& search, const Finalis
   return rivals;
 }
 
-// Whether the motion leads to the same pose, or to the same by a half turn that maps the part onto itself.
-bool LeadsBack(const RegistrationModel& model, const Eigen::Isometry3d& motion,
-               const std::vector<Eigen::Isometry3d>& turns) {
-  if (CornerMotionMm(motion, model) < kSamePoseMm || IsSymmetry(model, motion)) return true;
-  return std::ranges::any_of(turns, [&](const Eigen::Isometry3d& turn) {
-    return CornerMotionMm(turn * motion, model) < kSamePoseMm && IsSymmetry(model, turn);
-  });
-}
-
 // The best pose, unless another one explains the scan about as well.
 Result<Registration> Choose(const ScanSample& sample, const RegistrationModel& model,
                             const Finalists& finalists, const std::vector<Eigen::Isometry3d>& turns,
@@ -233,7 +224,7 @@ Result<Registration> Choose(const ScanSample& sample, const RegistrationModel& m
   Registration best = BestOf(sample, model, finalists.passed, options);
   for (const auto& other : RivalsOf({sample, model, best.model_from_scan, options}, finalists, turns)) {
     const Eigen::Isometry3d motion = other * best.model_from_scan.inverse();
-    if (LeadsBack(model, motion, turns)) continue;
+    if (CornerMotionMm(motion, model) < kSamePoseMm || IsNearSymmetry(model, motion, kSamePoseMm)) continue;
     const PoseScores scores = CompareScores(sample, model, best.model_from_scan, other, options);
     best.rival_ratio = std::min(best.rival_ratio, scores.Ratio());
     if (scores.other_mm > options.rival_ratio * scores.one_mm) continue;

@@ -12,8 +12,14 @@ RegistrationModel::RegistrationModel(TriangleIndex surface, const ModelBundle& b
       spacing_mm_(bundle.spacing_mm),
       chord_error_mm_(bundle.chord_error_mm) {
   Eigen::AlignedBox3d box;
+  std::vector<bool> taken(bundle.vertices.size(), false);
   for (const TriangleCorners& t : bundle.triangles) {
-    for (const std::uint32_t v : t) box.extend(bundle.vertices[v].cast<double>());
+    for (const std::uint32_t v : t) {
+      if (taken[v]) continue;
+      taken[v] = true;
+      box.extend(bundle.vertices[v].cast<double>());
+      vertices_.push_back(bundle.vertices[v]);
+    }
   }
   box_low_ = box.min();
   box_high_ = box.max();

@@ -33,6 +33,8 @@ class RegistrationModel {
   // Evenly spread over the surface, about one per spacing_mm^2; the paper's point cloud Q.
   const std::vector<Eigen::Vector3f>& sample_points() const { return sample_points_; }
   const std::vector<Eigen::Vector3f>& sample_normals() const { return sample_normals_; }
+  // The corners of the triangles, each once.
+  const std::vector<Eigen::Vector3f>& vertices() const { return vertices_; }
   double spacing_mm() const { return spacing_mm_; }
   double chord_error_mm() const { return chord_error_mm_; }  // see ModelBundle
   const Eigen::Vector3d& box_low() const { return box_low_; }
@@ -46,7 +48,7 @@ class RegistrationModel {
 
   TriangleIndex surface_;
   SurfaceGrid grid_;
-  std::vector<Eigen::Vector3f> sample_points_, sample_normals_;
+  std::vector<Eigen::Vector3f> sample_points_, sample_normals_, vertices_;
   Eigen::Vector3d box_low_, box_high_;
   double spacing_mm_;
   double chord_error_mm_;

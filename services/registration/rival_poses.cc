@@ -10,16 +10,20 @@
 namespace forgescan {
 namespace {
 
-constexpr std::size_t kProfilePoints = 400, kAlignPoints = 2'000, kSymmetryPoints = 1'000;
+constexpr std::size_t kProfilePoints = 400, kAlignPoints = 2'000, kSettlePoints = 1'000;
 constexpr double kProfileStepMm = 1;   // a valley of the capped score is a few mm wide
 constexpr int kMostProfileSteps = 40;  // to each side
 constexpr double kRidge = 1.1;         // a valley lies behind a ridge this much higher than its bottom
 constexpr std::size_t kMostValleys = 3;
 constexpr int kRivalIterations = 20;
 constexpr double kHopeless = 4;        // a rough alignment with so many times the score is not refined
-constexpr double kSymmetryMm = 0.005;  // mean distance of a model from itself: rounding of its file
-constexpr double kStartFactor = 2;     // as in RegisterScan's check against the start
-constexpr double kSamePoseShare = 2;   // of the threshold's floor: nearer poses are the same valley
+constexpr double kSymmetryMm = 0.005;  // distance of a model from itself: rounding of its file
+constexpr int kMostSettleSteps = 20;
+constexpr double kSettledMm = 1e-4;      // a step that moves less is the last
+constexpr double kSettleDamping = 1e-6;  // a body of revolution stays turned as it is:
+constexpr double kAnything = -1;         // no eigenvalue is too small
+constexpr double kStartFactor = 2;       // as in RegisterScan's check against the start
+constexpr double kSamePoseShare = 2;     // of the threshold's floor: nearer poses are the same valley
 
 ScanSample Thinned(const ScanSample& sample, std::size_t most) {
   const std::size_t step = std::max<std::size_t>(1, (sample.size() + most - 1) / most);
@@ -107,6 +111,26 @@ bool IsStronger(const RivalPose& a, const RivalPose& b, const IcpOptions& option
   return pressure(a) < pressure(b);
 }
 
+// How far a model may lie from itself: each of its two tessellations may be off by the chord error.
+double SymmetryLimitMm(const RegistrationModel& model) {
+  return std::max(kSymmetryMm, 2 * model.chord_error_mm());
+}
+
+// The motion nearby that brings the model's samples onto its surface, by least squares.
+std::optional<Eigen::Isometry3d> SettleOnItself(const ScanSample& samples, const RegistrationModel& model,
+                                                Eigen::Isometry3d motion, double reach_mm) {
+  IcpOptions options;
+  options.threads = 1;
+  for (int i = 0; i < kMostSettleSteps; ++i) {
+    const std::vector<Pair> pairs = PairWithSurface(samples, model, motion, reach_mm, options);
+    const auto step = SolveStep(pairs, FrameOf(model), {kAnything, kSettleDamping, 1});
+    if (!step.ok()) return std::nullopt;
+    motion = step->moved_from_before * motion;
+    if (std::max(step->rotation_mm, step->translation_mm) < kSettledMm) break;
+  }
+  return motion;
+}
+
 }  // namespace
 
 Eigen::Isometry3d HalfTurn(const RegistrationModel& model, int axis) {
@@ -115,9 +139,23 @@ Eigen::Isometry3d HalfTurn(const RegistrationModel& model, int axis) {
 }
 
 bool IsSymmetry(const RegistrationModel& model, const Eigen::Isometry3d& motion) {
-  const ScanSample samples = Thinned({model.sample_points(), {}}, kSymmetryPoints);
-  const double limit_mm = std::max(kSymmetryMm, model.chord_error_mm());
-  return MeanOf(CappedDistances(samples, model, motion, 100 * limit_mm, 1)) <= limit_mm;
+  const auto limit_mm = static_cast<float>(SymmetryLimitMm(model));
+  const auto on_surface = [&](const Eigen::Vector3f& p) {
+    return model.FindSurface((motion * p.cast<double>()).cast<float>(), limit_mm).has_value();
+  };
+  return std::ranges::all_of(model.vertices(), on_surface) &&
+         std::ranges::all_of(model.sample_points(), on_surface);
+}
+
+bool IsNearSymmetry(const RegistrationModel& model, const Eigen::Isometry3d& motion, double within_mm) {
+  const ScanSample samples = Thinned({model.sample_points(), model.sample_normals()}, kSettlePoints);
+  const double reach_mm = within_mm + SymmetryLimitMm(model);
+  const auto distances = CappedDistances(samples, model, motion, 2 * reach_mm, 1);
+  // No motion of the corners by within_mm brings such a sample onto the surface.
+  if (std::ranges::any_of(distances, [&](float d) { return d > reach_mm; })) return false;
+  const auto settled = SettleOnItself(samples, model, motion, 2 * reach_mm);
+  return settled && CornerMotionMm(*settled * motion.inverse(), model) <= within_mm &&
+         IsSymmetry(model, *settled);
 }
 
 PoseScores CompareScores(const ScanSample& sample, const RegistrationModel& model,

@@ -59,7 +59,11 @@ Status CheckRival(const RivalPose& rival, const IcpOptions& options);
 
 // A half turn about model axis 0, 1 or 2 through the box's centre.
 Eigen::Isometry3d HalfTurn(const RegistrationModel& model, int axis);
-// Whether the motion maps the model onto itself, to the precision of its triangles.
+// Whether the motion maps the model onto itself: every vertex and every sample of it, to the precision of its
+// triangles. One groove is enough for a no.
 bool IsSymmetry(const RegistrationModel& model, const Eigen::Isometry3d& motion);
+// Whether such a motion lies so near that no corner of the model's box ends farther than within_mm from where
+// `motion` takes it: for a motion between two measured poses.
+bool IsNearSymmetry(const RegistrationModel& model, const Eigen::Isometry3d& motion, double within_mm);
 
 }  // namespace forgescan

@@ -150,10 +150,11 @@ bool OnTriangle(RTCPointQueryFunctionArguments* arguments) {
   const TriangleCorners& t = query.data->triangles[arguments->primID];
   const Eigen::Vector3f &a = query.data->vertices[t[0]], &b = query.data->vertices[t[1]],
                         &c = query.data->vertices[t[2]];
-  const Eigen::Vector3f arm = query.point - NearestOnTriangle(query.point, a, b - a, c - a);
+  const Eigen::Vector3f& normal = query.data->normals[arguments->primID];
+  const Eigen::Vector3f arm = query.point - NearestOnTriangle(query.point, a, b - a, c - a, normal);
   const float squared = arm.squaredNorm();
   if (!(squared < query.squared * (1 + 1e-5F))) return false;
-  const float height = query.data->normals[arguments->primID].dot(arm);
+  const float height = normal.dot(arm);
   if (squared > query.squared * (1 - 1e-5F) && std::abs(height) <= std::abs(query.height)) return false;
   query.height = height;
   query.squared = std::min(squared, query.squared);

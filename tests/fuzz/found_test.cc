@@ -10,10 +10,12 @@
 #include "services/common/bus/sim_bus.h"
 #include "services/common/bus/stream_header.h"
 #include "services/common/bus/stream_hub.h"
+#include "services/common/config/config.h"
 #include "services/common/imaging/stereo_calibration.h"
 #include "services/common/model/bundle_file.h"
 #include "services/common/model/model_import.h"
 #include "services/common/model/stl_file.h"
+#include "services/reconstruction/pattern_set.h"
 #include "services/recorder/recording_name.h"
 #include "services/robot/part_memory.h"
 #include "tests/fuzz/readers.h"
@@ -122,6 +124,38 @@ TEST(Found, ACalibrationOfSeveralDocumentsIsRefused) {
       "%YAML:1.r; %YA!!opencv-matrix\n  \n   cols: 3\n Y0\n--.0\n----\nK1.0\n---\nK,: "
       "en\n\xB5lc%Y:0.0\n---\n\xB5height: 120\n";
   EXPECT_FALSE(LoadStereoCalibration(ScratchFile("stereo.yaml", text)).ok());
+}
+
+// The same, with the rest of the document on its line.
+TEST(Found, ACalibrationThatBeginsOnTheLineOfItsMarkIsRefused) {
+  const auto calibration =
+      LoadStereoCalibration(ScratchFile("stereo.yaml", "%YAML:1.0\n---stereo.yaml%YAML:1.0\n-cv-ma--\nKl: "));
+  ASSERT_FALSE(calibration.ok());
+  EXPECT_THAT(calibration.error().message, HasSubstr("one line ---"));
+}
+
+// toml++ reached what it holds unreachable.
+TEST(Found, ALetterBeyondAsciiStandsOnlyInTextsAndComments) {
+  const auto complaint = [](const std::string& text) {
+    const auto file = ConfigFile::Parse(text, "station.toml");
+    return file.ok() ? std::string() : file.error().message;
+  };
+  EXPECT_THAT(complaint("a = 1\nb = ä\n"), HasSubstr("station.toml: line 2: a character beyond ASCII"));
+  for (const char* text : {"ä = 1", "a = 1 、", "\xC9\x85", R"(a = """"""ä)", R"(a = "\ä")",
+                           "a = \"\"\"\\\n  ä\"\"\"", "a = 'b' ä", "a = '''b''''' ä"}) {
+    EXPECT_THAT(complaint(text), HasSubstr("beyond ASCII")) << text;
+  }
+  for (const char* text : {"\uFEFFa = 1", R"(a = "ä\"ä" # ä)", R"(a = '\' # ä)",
+                           "a = \"\"\"\n\\\n \\nä\"\"\"\"\"", "a = '''ä'\n''ä'''"}) {
+    EXPECT_EQ(complaint(text), "") << text;
+  }
+}
+
+// toml++ cast it to a whole number, which is undefined.
+TEST(Found, AHugeNumberOfPixelsIsRefused) {
+  const auto pattern = ParsePatternSet("projector_width_px = 12e80\nbackground = 'own'\n", "pattern.toml");
+  ASSERT_FALSE(pattern.ok());
+  EXPECT_THAT(pattern.error().message, HasSubstr("projector_width_px"));
 }
 
 // Cells of such a mesh cannot be numbered.

@@ -4,6 +4,8 @@
 #include <filesystem>
 #include <utility>
 
+#include "services/common/config/toml_text.h"
+#include "services/common/input_file.h"
 #include "tools/virtual_station/cell_sections.h"
 
 namespace forgescan {
@@ -124,7 +126,7 @@ Status CheckSections(const CellFile& file) {
 Result<CellConfig> ReadConfig(const CellFile& file, int scale_divisor) {
   RETURN_IF_ERROR(CheckSections(file));
   CellConfig config;
-  const auto seed = file.root["seed"].value<std::int64_t>();
+  const auto seed = file.root["seed"].value_exact<std::int64_t>();
   if (!seed || *seed < 0) {
     return Fail(ErrorCode::kFormat, "{}: seed must be a whole number >= 0", file.path);
   }
@@ -149,8 +151,10 @@ Result<CellConfig> LoadCellConfig(const std::string& path, int scale_divisor) {
   if (!std::filesystem::is_regular_file(path)) {
     return Fail(ErrorCode::kNotFound, "{}: there is no such file", path);
   }
+  ASSIGN_OR_RETURN(const std::string text, ReadInputFile(path));
+  RETURN_IF_ERROR(CheckTomlText(text, path));
   try {
-    const toml::table root = toml::parse_file(path);
+    const toml::table root = toml::parse(text, path);
     return ReadConfig({root, path}, scale_divisor);
   } catch (const toml::parse_error& error) {
     return Fail(ErrorCode::kFormat, "{}: line {}: {}", path, error.source().begin.line, error.description());

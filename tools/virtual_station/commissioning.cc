@@ -9,6 +9,8 @@
 #include <optional>
 #include <utility>
 
+#include "services/common/config/toml_text.h"
+
 namespace forgescan {
 namespace {
 
@@ -49,6 +51,7 @@ Error Broken(const toml::parse_error& error) {
 
 // The two lists of one curve: the station states both, or both are measured.
 Status CheckExpansion(const std::string& text) {
+  RETURN_IF_ERROR(CheckTomlText(text, "station.toml"));
   const toml::table root = toml::parse(text);
   const toml::node_view fusion = root["fusion"];
   if (!fusion["expansion_degc"] == !fusion["expansion"]) {
@@ -59,7 +62,7 @@ Status CheckExpansion(const std::string& text) {
 }
 
 Status CheckSize(const toml::node_view<const toml::node>& stated, const char* key, std::int64_t rendered) {
-  const auto value = stated.value<std::int64_t>();
+  const auto value = stated.value_exact<std::int64_t>();
   if (!value.has_value() || *value == rendered) {
     return {};
   }

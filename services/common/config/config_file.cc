@@ -1,23 +1,20 @@
 #include <libdeflate.h>
 
 #include <algorithm>
-#include <fstream>
-#include <iterator>
 
 #include "services/common/config/config_node.h"
+#include "services/common/config/toml_text.h"
+#include "services/common/input_file.h"
 
 namespace forgescan {
 
 Result<ConfigFile> ConfigFile::Load(const std::string& path) {
-  std::ifstream stream(path, std::ios::binary);
-  const std::string text{std::istreambuf_iterator<char>(stream), {}};
-  if (!stream.is_open() || stream.bad()) {
-    return Fail(ErrorCode::kNotFound, "{}: cannot be read", path);
-  }
+  ASSIGN_OR_RETURN(const std::string text, ReadInputFile(path));
   return Parse(text, path);
 }
 
 Result<ConfigFile> ConfigFile::Parse(std::string_view text, const std::string& name) {
+  RETURN_IF_ERROR(CheckTomlText(text, name));
   toml::parse_result parsed = toml::parse(text, name);
   if (!parsed) {
     const auto& at = parsed.error().source().begin;

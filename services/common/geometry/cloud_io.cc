@@ -2,30 +2,13 @@
 
 #include <array>
 #include <bit>
-#include <fstream>
-#include <sstream>
 #include <string>
-#include <system_error>
-#include <utility>
 
+#include "services/common/input_file.h"
 #include "services/common/output_file.h"
 
 namespace forgescan {
 namespace {
-
-Result<std::string> ReadFile(const std::filesystem::path& path) {
-  std::error_code failure;
-  if (!std::filesystem::is_regular_file(path, failure)) {
-    return Fail(ErrorCode::kNotFound, "{}: there is no such file", path.string());
-  }
-  std::ifstream file(path, std::ios::binary);
-  std::ostringstream bytes;
-  bytes << file.rdbuf();
-  if (!file || !bytes) {
-    return Fail(ErrorCode::kIo, "{}: cannot be read, or is empty", path.string());
-  }
-  return std::move(bytes).str();
-}
 
 template <typename T>
 void Append(std::string& bytes, const T& value) {
@@ -59,12 +42,12 @@ std::string EncodePly(const PointCloud& cloud) {
 }  // namespace
 
 Result<CloudFromFile> ReadPointCloud(const std::filesystem::path& path) {
-  ASSIGN_OR_RETURN(const std::string bytes, ReadFile(path));
+  ASSIGN_OR_RETURN(const std::string bytes, ReadInputFile(path));
   return ParsePointCloud(bytes, path.string());
 }
 
 Result<TriangleMesh> ReadTriangleMesh(const std::filesystem::path& path) {
-  ASSIGN_OR_RETURN(const std::string bytes, ReadFile(path));
+  ASSIGN_OR_RETURN(const std::string bytes, ReadInputFile(path));
   return ParseTriangleMesh(bytes, path.string());
 }
 

@@ -20,7 +20,7 @@ struct CloudFromFile : PointCloud {
 // not the name. Coordinates of more than 100 m are refused: single precision does not resolve 0.01 mm there.
 // Taken: x y z, the normal (nx ny nz or normal_x normal_y normal_z), sigma_mm, view; other
 // properties are skipped. A point with a coordinate that is not finite is left out and counted: both formats
-// write "no point" so. Units: as in the file, mm by house rule. Errors: kNotFound, kIo, kFormat; each names
+// write "no point" so. Units: as in the file, mm by house rule. Errors: kNotFound, kFormat; each names
 // the file. A file is taken whole or not at all: in ascii one line is one row with the header's columns, and
 // after the last row nothing follows. Cost: about 0.1 s per million points.
 Result<CloudFromFile> ReadPointCloud(const std::filesystem::path& path);

@@ -138,7 +138,7 @@ void TriangleIndex::BuildNode(std::size_t begin, std::size_t end, std::vector<Ei
 }
 
 void TriangleIndex::Visit(const Corners& c, std::uint32_t slot, const Eigen::Vector3f& point, Best& best) {
-  const Eigen::Vector3f foot = NearestOnTriangle(point, c.a, c.ab, c.ac);
+  const Eigen::Vector3f foot = NearestOnTriangle(point, c.a, c.ab, c.ac, c.normal);
   const float squared = (point - foot).squaredNorm();
   if (!(squared <= best.squared * (1 + kTie))) return;  // also when a sliver gave NaN
   const float off_plane = std::abs(c.normal.dot(point - foot));
@@ -186,7 +186,7 @@ std::vector<TriangleIndex::Distance> TriangleIndex::FindWithin(const Eigen::Vect
     if (node.count == 0) stack.insert(stack.end(), {node.first, at + 1});
     for (std::uint32_t slot = node.first; slot < node.first + node.count && found.size() < most; ++slot) {
       const Corners& c = corners_[slot];
-      const float distance_mm = (p - NearestOnTriangle(p, c.a, c.ab, c.ac)).norm();
+      const float distance_mm = (p - NearestOnTriangle(p, c.a, c.ab, c.ac, c.normal)).norm();
       if (distance_mm <= radius_mm) found.push_back({c.triangle, distance_mm});
     }
   }
@@ -200,7 +200,7 @@ std::optional<TriangleIndex::Nearest> TriangleIndex::Find(const Eigen::Vector3f&
   Best best{max_distance_mm * max_distance_mm};
   if (hint < slot_of_.size()) {
     const Corners& c = corners_[slot_of_[hint]];
-    const float bound = (p - NearestOnTriangle(p, c.a, c.ab, c.ac)).squaredNorm();
+    const float bound = (p - NearestOnTriangle(p, c.a, c.ab, c.ac, c.normal)).squaredNorm();
     best.squared = std::min(best.squared, bound * (1 + kTie));
   }
   struct Entry {

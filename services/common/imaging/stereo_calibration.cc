@@ -6,12 +6,13 @@
 #include <cmath>
 #include <cstdint>
 #include <exception>
-#include <fstream>
-#include <iterator>
 #include <opencv2/core.hpp>
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
+
+#include "services/common/input_file.h"
 
 namespace forgescan {
 namespace {
@@ -40,23 +41,26 @@ bool NestsLittle(const std::string& text) {
   return text.size() <= kMaxFileBytes && std::count(text.begin(), text.end(), '<') <= kMaxTags;
 }
 
-// How many lines begin so, white space before it left out, which OpenCV skips.
-long LinesWith(const std::string& text, std::string_view begin) {
-  long lines = 0;
+// The lines that begin so, white space about them left out, which OpenCV skips.
+std::vector<std::string_view> LinesWith(std::string_view text, std::string_view begin) {
+  constexpr std::string_view kWhite = " \t\r\n";
+  std::vector<std::string_view> lines;
   for (std::size_t at = 0; at < text.size();) {
-    const std::size_t word = std::min(text.find_first_not_of(" \t\r\n", at), text.size());
-    lines += text.compare(word, begin.size(), begin) == 0 ? 1 : 0;
-    at = text.find('\n', word);
-    at = at == std::string::npos ? text.size() : at + 1;
+    const std::size_t word = std::min(text.find_first_not_of(kWhite, at), text.size());
+    at = std::min(text.find('\n', word), text.size());
+    const std::string_view line = text.substr(word, at - word);
+    if (line.starts_with(begin)) lines.push_back(line.substr(0, line.find_last_not_of(kWhite) + 1));
   }
   return lines;
 }
 
-// OpenCV's YAML parser may run for ever on a file with several documents or directives; it writes one of
-// each.
+// OpenCV's YAML parser may run for ever on a file with several documents or directives, or with more on the
+// line that begins the document; it writes one of each.
 bool IsOneDocument(const std::string& text) {
   if (!text.starts_with("%YAML")) return true;  // XML or JSON
-  return LinesWith(text, "%") == 1 && LinesWith(text, "---") <= 1;
+  const auto documents = LinesWith(text, "---");
+  return LinesWith(text, "%").size() == 1 &&
+         (documents.empty() || (documents.size() == 1 && documents[0] == "---"));
 }
 
 // OpenCV makes room for rows x cols numbers before it looks how many there are.
@@ -236,15 +240,14 @@ Result<StereoCalibration> LoadStereoCalibration(const std::filesystem::path& pat
   if (!std::filesystem::is_regular_file(path)) {
     return Fail(ErrorCode::kNotFound, "{}: there is no such calibration file", name);
   }
-  std::ifstream stream(path, std::ios::binary);
-  const std::string text{std::istreambuf_iterator<char>(stream), {}};
+  ASSIGN_OR_RETURN(const std::string text, ReadInputFile(path));
   if (!NestsLittle(text)) {
     return Fail(ErrorCode::kFormat, "{}: is not a calibration file: larger than 1 MB, or nested deeply",
                 name);
   }
   if (!IsOneDocument(text)) {
-    return Fail(ErrorCode::kFormat, "{}: is not a calibration file: one %YAML line and one --- are allowed",
-                name);
+    return Fail(ErrorCode::kFormat,
+                "{}: is not a calibration file: one line %YAML and one line --- are allowed", name);
   }
   try {
     const cv::FileStorage file(text, cv::FileStorage::READ | cv::FileStorage::MEMORY);

@@ -9,6 +9,7 @@
 #include <initializer_list>
 #include <set>
 
+#include "services/common/config/toml_text.h"
 #include "services/common/model/bundle_file.h"
 
 namespace forgescan {
@@ -228,6 +229,7 @@ const char* SizeDefinitionName(SizeDefinition definition) {
 const char* DimensionTypeName(DimensionType type) { return kTypeNames[static_cast<std::size_t>(type)]; }
 
 Result<Features> ParseFeatures(std::string_view text, std::string_view name) {
+  RETURN_IF_ERROR(CheckTomlText(text, name));
   try {
     return TakeFeatures(toml::parse(text), std::string(name));
   } catch (const toml::parse_error& error) {

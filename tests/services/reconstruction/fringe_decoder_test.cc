@@ -1,3 +1,4 @@
+// Decoding of the station's frames: what it keeps, and that every path gives the same.
 #include "services/reconstruction/fringe_decoder.h"
 
 #include <gtest/gtest.h>
@@ -5,30 +6,15 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <numbers>
 #include <opencv2/core.hpp>
 #include <optional>
 
-#include "tests/services/reconstruction/phase_scene.h"
+#include "tests/services/reconstruction/decoded_phases.h"
 
 namespace forgescan {
 namespace {
 
-constexpr double kTwoPi = 2 * std::numbers::pi;
 constexpr auto kValid = static_cast<std::uint8_t>(MaskCause::kValid);
-
-FringeDecoder Decoder(const PatternSet& pattern, const ReconstructionConfig& config,
-                      std::optional<SimdPath> path = BestSimdPath()) {
-  auto decoder = FringeDecoder::Create(pattern, config, path);
-  EXPECT_TRUE(decoder.ok());
-  return std::move(decoder).value();
-}
-
-DecodedView Decode(const FringeDecoder& decoder, const std::vector<cv::Mat>& frames) {
-  auto view = decoder.Decode(frames);
-  EXPECT_TRUE(view.ok());
-  return std::move(view).value();
-}
 
 bool AreSameBytes(const cv::Mat& a, const cv::Mat& b) {
   if (a.size() != b.size() || a.type() != b.type()) {
@@ -142,15 +128,6 @@ TEST(FringeDecoder, ARecycledViewIsAsGoodAsAFreshOne) {
   EXPECT_NE(Decode(decoder, other.frames).cause.data, held.data);
 }
 
-// A pixel for each phase of the finest fringes, many times, so that bins of it can be compared with the
-// formula.
-Columns Sweep(cv::Size size) {
-  Columns columns(size);
-  cv::RNG random(7);
-  random.fill(columns, cv::RNG::UNIFORM, 100.0, 1800.0);
-  return columns;
-}
-
 // Whole blocks without contrast are not decoded; what they get instead is the same on every path.
 TEST(FringeDecoder, WithoutContrastThereIsNoCoordinate) {
   ReconstructionConfig config;
@@ -203,115 +180,6 @@ TEST(FringeDecoder, DimFringesAreKeptAsByThePlainArithmetic) {
   }
   EXPECT_GT(kept(11, BestSimdPath()), 0.99);
   EXPECT_LT(kept(6, BestSimdPath()), 0.01);
-}
-
-struct Bin {
-  double measured = 0;
-  double predicted = 0;
-  long count = 0;
-};
-
-// DOMAIN's figures, which the general formula must give: 1 + cos(2 phi) / 2, 1.5 + sin(2 phi) / 2, own frames
-// 1/2.
-TEST(PhaseVariance, IsThePublishedFormula) {
-  const auto shared = MakePhaseEstimator(StationPattern(Background::kShared));
-  const auto own = MakePhaseEstimator(StationPattern(Background::kOwn));
-  for (double phase = 0; phase < kTwoPi; phase += 0.1) {
-    EXPECT_NEAR(shared->PhaseVariance(1, phase), 1 + 0.5 * std::cos(2 * phase), 1e-9);
-    EXPECT_NEAR(shared->PhaseVariance(0, phase), 1.5 + 0.5 * std::sin(2 * phase), 1e-9);
-    EXPECT_NEAR(own->PhaseVariance(0, phase), 0.5, 1e-9);
-  }
-}
-
-TEST(PhaseVariance, IsWhatNoisyFramesShowInEachOf16Phases) {
-  constexpr double kNoiseDn = 2, kModulationDn = 80, kRounding = 1.0 / 12;
-  const Columns columns = Sweep({1000, 500});
-  for (const Background background : {Background::kShared, Background::kOwn}) {
-    const PatternSet pattern = StationPattern(background);
-    const auto estimator = MakePhaseEstimator(pattern);
-    const auto frames =
-        RenderColumns(columns, pattern, {.modulation_dn = kModulationDn, .noise = {kNoiseDn, 0}});
-    for (std::size_t j = 0; j < 3; ++j) {
-      const auto at = static_cast<Eigen::Index>(j);
-      std::array<Bin, 16> bins;
-      for (int row = 0; row < columns.rows; ++row) {
-        for (int column = 0; column < columns.cols; ++column) {
-          double c = 0, s = 0;
-          for (std::size_t i = 0; i < frames.size(); ++i) {
-            const double grey = frames[i].at<std::uint8_t>(row, column);
-            c += estimator->cosine(at, static_cast<Eigen::Index>(i)) * grey;
-            s += estimator->sine(at, static_cast<Eigen::Index>(i)) * grey;
-          }
-          const double turns = columns(row, column) / pattern.frequencies[j].period_px;
-          const double phase = kTwoPi * (turns - std::floor(turns));
-          const double off = std::remainder(std::atan2(s, c) - phase, kTwoPi);
-          Bin& bin = bins[static_cast<std::size_t>(16 * (turns - std::floor(turns)))];
-          bin.measured += off * off;
-          bin.predicted += estimator->PhaseVariance(static_cast<int>(j), phase) *
-                           (kNoiseDn * kNoiseDn + kRounding) / (kModulationDn * kModulationDn);
-          ++bin.count;
-        }
-      }
-      for (const Bin& bin : bins) {
-        EXPECT_GT(bin.count, 25000);
-        EXPECT_NEAR(bin.measured / bin.predicted, 1,
-                    0.05);  // 30,000 values: the variance of their variance is 0.8 %
-      }
-    }
-  }
-}
-
-// Camera noise that grows with the light, as a coordinate sees it, in 16 phases of each frequency.
-TEST(FringeDecoder, PredictsTheNoiseOfACoordinateInEveryPhase) {
-  ReconstructionConfig config;
-  config.noise = {.read_noise_dn = 1, .gain_dn = 0.03};
-  const Columns columns = Sweep({1400, 1000});
-  for (const Background background : {Background::kShared, Background::kOwn}) {
-    const PatternSet pattern = StationPattern(background);
-    const auto frames = RenderColumns(columns, pattern, {.noise = config.noise});
-    config.noise.read_noise_dn = std::sqrt(1 + 1.0 / 12);  // whole grey values
-    const DecodedView view = Decode(Decoder(pattern, config), frames);
-    config.noise.read_noise_dn = 1;
-    for (std::size_t j = 0; j < 3; ++j) {
-      std::array<Bin, 16> bins;
-      for (int row = 0; row < columns.rows; ++row) {
-        for (int column = 0; column < columns.cols; ++column) {
-          const double turns = columns(row, column) / pattern.frequencies[j].period_px;
-          const double off = static_cast<double>(view.coordinate_px(row, column)) - columns(row, column);
-          Bin& bin = bins[static_cast<std::size_t>(16 * (turns - std::floor(turns)))];
-          if (std::abs(off) < 1) {
-            bin.measured += off * off;
-            bin.predicted += std::pow(static_cast<double>(view.SigmaPx(row, column)), 2);
-            ++bin.count;
-          }
-        }
-      }
-      for (const Bin& bin : bins) {
-        EXPECT_NEAR(bin.measured / bin.predicted, 1, 0.05) << bin.count;
-      }
-    }
-  }
-}
-
-TEST(FringeDecoder, WrongFringeOrdersAreRarerThanOneIn50000BeforeAnyRepair) {
-  ReconstructionConfig config;
-  config.noise = {.read_noise_dn = 0.03 * 80, .gain_dn = 0};
-  config.repair_tolerance_periods = 0;
-  const Columns columns = Sweep({1700, 1300});
-  const PatternSet pattern = StationPattern(Background::kShared);
-  const auto frames = RenderColumns(columns, pattern, {.modulation_dn = 80, .noise = config.noise});
-  const double half_period_px = pattern.frequencies[1].period_px / 2;
-  for (const std::optional<SimdPath> path : {std::optional(BestSimdPath()), std::optional<SimdPath>()}) {
-    const DecodedView view = Decode(Decoder(pattern, config, path), frames);
-    long wrong = 0;
-    for (int row = 0; row < columns.rows; ++row) {
-      for (int column = 0; column < columns.cols; ++column) {  // all of them, also those masked as doubtful
-        wrong += std::abs(static_cast<double>(view.coordinate_px(row, column)) - columns(row, column)) >
-                 half_period_px;
-      }
-    }
-    EXPECT_LT(static_cast<double>(wrong), 2e-5 * static_cast<double>(columns.total()));
-  }
 }
 
 TEST(FringeDecoder, NamesTheCause) {

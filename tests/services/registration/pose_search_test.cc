@@ -164,16 +164,77 @@ TEST_F(PoseSearchTest, ARefusedPoseIsStillARival) {
   EXPECT_NE(result.error().message.find("ambiguous"), std::string::npos) << result.error().message;
 }
 
-// A half turn that maps the part onto itself is no rival, however noisy the poses are.
+// Of `seeds` noisy scans of the bar, those with a pose.
+int AcceptedBars(const std::vector<Eigen::Vector2f>& outline, double noise_mm, std::uint64_t seeds) {
+  const auto bar = BarOf(outline);
+  EXPECT_TRUE(bar.ok()) << bar.error().message;
+  const auto model = RegistrationModel::Build(*bar);
+  EXPECT_TRUE(model.ok()) << model.error().message;
+  int accepted = 0;
+  for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
+    const auto result =
+        SearchPose(Moved(ScanOf(*bar, {20'000, 0, noise_mm, seed}), AnyPose(seed)), *model, {});
+    EXPECT_TRUE(result.ok()) << "seed " << seed << ": " << result.error().message;
+    accepted += result.ok() ? 1 : 0;
+  }
+  return accepted;
+}
+
+const std::vector<Eigen::Vector2f> kBox = {{-60, -25}, {60, -25}, {60, 25}, {-60, 25}};
+
+const std::vector<Eigen::Vector2f> kSquare = {{-50, -50}, {50, -50}, {50, 50}, {-50, 50}};
+
+// A triangle without its corners.
+std::vector<Eigen::Vector2f> ThreeSided() {
+  std::vector<Eigen::Vector2f> outline;
+  for (const float degrees : {-20.0F, 20.0F, 100.0F, 140.0F, 220.0F, 260.0F}) {
+    const float angle = degrees * std::numbers::pi_v<float> / 180;
+    outline.emplace_back(60 * std::cos(angle), 60 * std::sin(angle));
+  }
+  return outline;
+}
+
+// A turn that maps the part onto itself is no rival, however noisy the poses are.
 TEST_F(PoseSearchTest, ASymmetricPartIsNotRefused) {
-  const auto bar = BarOf({{-60, -25}, {60, -25}, {60, 25}, {-60, 25}});
+  for (const double noise_mm : {0.05, 0.1, 0.2}) EXPECT_EQ(AcceptedBars(kBox, noise_mm, 6), 6) << noise_mm;
+}
+TEST_F(PoseSearchTest, APartLikeItselfAfterAQuarterTurnIsNotRefused) {
+  EXPECT_EQ(AcceptedBars(kSquare, 0.05, 6), 6);
+}
+TEST_F(PoseSearchTest, APartLikeItselfAfterAThirdOfATurnIsNotRefused) {
+  EXPECT_EQ(AcceptedBars(ThreeSided(), 0.05, 6), 6);
+}
+TEST_F(PoseSearchTest, DISABLED_TwentySymmetricPartsOfEachKind) {
+  for (const double noise_mm : {0.05, 0.1, 0.2}) {
+    for (const auto& outline : {kBox, kSquare, ThreeSided()})
+      EXPECT_EQ(AcceptedBars(outline, noise_mm, 20), 20);
+  }
+}
+
+// The box with a groove of 1 x 1 mm below, which is 0.5 % of its surface: too little to tell it in the noise,
+// but the half turn about x is another pose.
+TEST_F(PoseSearchTest, AGrooveMakesTheHalfTurnARival) {
+  const auto bar = BarOf({{-60, -25},
+                          {-0.5F, -25},
+                          {-0.5F, -24},
+                          {0.5F, -24},
+                          {0.5F, -25},
+                          {60, -25},
+                          {60, 25},
+                          {0.5F, 25},
+                          {0.4F, 25},
+                          {-0.4F, 25},
+                          {-0.5F, 25},
+                          {-60, 25}});
   ASSERT_TRUE(bar.ok()) << bar.error().message;
   const auto model = RegistrationModel::Build(*bar);
   ASSERT_TRUE(model.ok()) << model.error().message;
-  for (const std::uint64_t seed : {1U, 2U, 3U}) {
-    const auto result = SearchPose(Moved(ScanOf(*bar, {20'000, 0, 0.1, seed}), AnyPose(seed)), *model, {});
-    EXPECT_TRUE(result.ok()) << result.error().message;
-  }
+  EXPECT_FALSE(IsSymmetry(*model, HalfTurn(*model, 0)));
+  EXPECT_FALSE(IsSymmetry(*model, HalfTurn(*model, 1)));
+  EXPECT_TRUE(IsSymmetry(*model, HalfTurn(*model, 2)));
+  const auto result = SearchPose(Moved(ScanOf(*bar, {20'000, 0, 0.1, 2}), AnyPose(2)), *model, {});
+  ASSERT_FALSE(result.ok());
+  EXPECT_NE(result.error().message.find("ambiguous"), std::string::npos) << result.error().message;
 }
 
 TEST_F(PoseSearchTest, RefusesForeignPointsOnlyAndTooFewPoints) {

@@ -207,6 +207,24 @@ TEST_F(RivalPosesTest, ASymmetricPartIsNotRefused) {
   EXPECT_LT(CornerMotionMm(result->model_from_scan * scan_from_model, box->model), 0.01);  // mm
 }
 
+// An axle with two ends alike: its half turn maps facets of the cylinders onto others, and a shift along the
+// axle is found and taken back, as far as it is allowed.
+TEST_F(RivalPosesTest, ASymmetryIsFoundFromNearby) {
+  testing::AxleSize size;
+  size.left_width_mm = size.right_width_mm = 178;
+  size.left_diameter_mm = size.right_diameter_mm = 89;
+  const auto axle = Prepare(testing::MakeAxle(size, 4));
+  ASSERT_TRUE(axle.ok());
+  const Eigen::Isometry3d turn = HalfTurn(axle->model, 2);
+  EXPECT_TRUE(IsSymmetry(axle->model, turn));
+  const Eigen::Isometry3d near = RandomMotion(axle->model.center(), 5e-4, 0.3, 1) * turn;
+  EXPECT_FALSE(IsSymmetry(axle->model, near));
+  EXPECT_TRUE(IsNearSymmetry(axle->model, near, 2));
+  EXPECT_FALSE(IsNearSymmetry(axle->model, near, 0.2));
+  EXPECT_FALSE(IsNearSymmetry(axle->model, HalfTurn(axle->model, 0), 2));
+  EXPECT_FALSE(IsNearSymmetry(axle_->model, HalfTurn(axle_->model, 2), 2));
+}
+
 // Without its waves and ends the rack can slide: the motion has a name.
 TEST_F(RivalPosesTest, TheDirectionThatIsNotHeldIsNamed) {
   const PointCloud all = ScanOf(rack_->bundle, {40'000, 0, 0.03, 9});

@@ -9,6 +9,7 @@
 #define TOML_HEADER_ONLY 1
 #include <toml++/toml.h>
 
+#include "services/common/config/toml_text.h"
 #include "services/common/input_file.h"
 #include "services/common/output_file.h"
 
@@ -31,6 +32,7 @@ constexpr Role kRoles[] = {{"calibration", &Station::calibration, {"reconstructi
                            {"features", &Station::features, {"report"}}};
 
 Result<toml::table> ParseToml(std::string_view text, const std::string& name) {
+  RETURN_IF_ERROR(CheckTomlText(text, name));
   toml::parse_result parsed = toml::parse(text);
   if (!parsed) {
     return Fail(ErrorCode::kFormat, "{}: {} (line {})", name, parsed.error().description(),

@@ -21,13 +21,6 @@ std::string PidFile(const std::string& folder) {
   return (std::filesystem::path(folder) / "station.pid").string();
 }
 
-struct flock WholeFile() {
-  struct flock whole {};  // from 0, of every length; a lock of the open file, not of the process
-  whole.l_type = F_WRLCK;
-  whole.l_whence = SEEK_SET;
-  return whole;
-}
-
 std::string ReadAll(int fd) {
   std::string text;
   std::array<char, 4096> buffer{};
@@ -72,12 +65,6 @@ bool IsTheFileAt(const std::string& path, int fd) {
 
 }  // namespace
 
-OwnedFd::~OwnedFd() {
-  if (fd_ >= 0) {
-    close(fd_);
-  }
-}
-
 Result<RunningStation> RunningStation::Find(const std::string& folder) {
   RunningStation station(OwnedFd(open(PidFile(folder).c_str(), O_RDONLY | O_CLOEXEC)));
   Content content = Parse(ReadAll(station.file_.get()));
@@ -91,10 +78,7 @@ Result<RunningStation> RunningStation::Find(const std::string& folder) {
   return station;
 }
 
-bool RunningStation::IsUp() const {
-  struct flock held = WholeFile();
-  return file_.get() >= 0 && fcntl(file_.get(), F_OFD_GETLK, &held) == 0 && held.l_type != F_UNLCK;
-}
+bool RunningStation::IsUp() const { return IsLockedByAnother(file_); }
 
 Status RunningStation::Outcome() const {
   const auto outcome = Parse(ReadAll(file_.get())).outcome;
@@ -108,21 +92,17 @@ Status RunningStation::Outcome() const {
 Result<StationLock> StationLock::Take(const std::string& folder, double stop_patience_s) {
   const std::string path = PidFile(folder);
   for (;;) {
-    OwnedFd file(open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644));
-    if (file.get() < 0) {
-      return Fail(ErrorCode::kIo, "{} cannot be written: {}", path, std::strerror(errno));
+    auto file = LockFile(path);
+    if (!file.ok()) {
+      return file.error().code == ErrorCode::kUnavailable
+                 ? Fail(ErrorCode::kUnavailable,
+                        "station {} is up already; forgescan station down {} stops it", folder, folder)
+                 : file.error();
     }
-    struct flock wanted = WholeFile();
-    if (fcntl(file.get(), F_OFD_SETLK, &wanted) != 0) {
-      const bool held = errno == EAGAIN || errno == EACCES;
-      return held ? Fail(ErrorCode::kUnavailable,
-                         "station {} is up already; forgescan station down {} stops it", folder, folder)
-                  : Fail(ErrorCode::kIo, "{} cannot be locked: {}", path, std::strerror(errno));
-    }
-    if (!IsTheFileAt(path, file.get())) {
+    if (!IsTheFileAt(path, file->get())) {
       continue;  // the station went down, and its file with it, between open and lock
     }
-    StationLock lock(path, std::move(file), stop_patience_s);
+    StationLock lock(path, std::move(*file), stop_patience_s);
     lock.left_behind_ = Parse(ReadAll(lock.file_.get())).services;
     lock.named_ = lock.Write(lock.left_behind_);  // still named if this process dies, too
     return lock;

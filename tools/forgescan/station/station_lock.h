@@ -10,6 +10,7 @@
 #include <string>
 #include <utility>
 
+#include "services/common/locked_file.h"
 #include "services/common/result.h"
 #include "tools/forgescan/station/process_id.h"
 
@@ -22,19 +23,6 @@ struct ServiceProcess {
   bool operator==(const ServiceProcess&) const = default;
 };
 using ServiceProcesses = std::map<std::string, ServiceProcess>;
-
-// A file descriptor, closed with the object.
-class OwnedFd {
- public:
-  explicit OwnedFd(int fd) : fd_(fd) {}
-  OwnedFd(OwnedFd&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
-  OwnedFd& operator=(OwnedFd&&) = delete;
-  ~OwnedFd();
-  int get() const { return fd_; }
-
- private:
-  int fd_;
-};
 
 // A station that is up, as somebody else than its supervisor sees it. Looking takes no lock.
 class RunningStation {
