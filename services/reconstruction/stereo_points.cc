@@ -53,7 +53,8 @@ Status CheckSlopes(double left, double right) {
 
 Status CheckSize(const DecodedView& view, const StereoRig& rig) {
   const cv::Size size(rig.size().width_px, rig.size().height_px);
-  if (view.cause.size() != size || view.coordinate_px.size() != size || view.variance_px2.size() != size) {
+  const cv::Size half(size.width, (size.height + 1) / 2);
+  if (view.cause.size() != size || view.coordinate_px.size() != size || view.variance_px2.size() != half) {
     return Fail(ErrorCode::kInvalidArgument, "the views have {} x {} px, prepared were {} x {}",
                 view.cause.cols, view.cause.rows, size.width, size.height);
   }

@@ -25,7 +25,7 @@ struct EpipolarBlock {
 // Raw images; strides in elements.
 struct RawView {
   const float* coordinate_px;
-  const std::uint16_t* variance_px2;  // upper halves of floats
+  const std::uint16_t* variance_px2;  // upper halves of floats, of even rows only
   const std::uint8_t* cause;          // 0: valid
   std::ptrdiff_t coordinate_stride, variance_stride, cause_stride;
   int width, height;

@@ -14,14 +14,12 @@ struct RawBlock {
   const std::uint8_t *upper_cause, *lower_cause;
 };
 
-// Both rows of a pair have nearly one variance, for fringes run across the rows: taking the even one's halves
-// what is read.
+// The variance is that of the even row, see DecodedView.
 FORGESCAN_INLINE RawBlock BlockAt(const RawView& view, int row, int column) {
   const float* const coordinate = view.coordinate_px + row * view.coordinate_stride + column;
   const std::uint8_t* const cause = view.cause + row * view.cause_stride + column;
-  const int even = (row + 1) & ~1;
   return {coordinate, coordinate + view.coordinate_stride,
-          view.variance_px2 + even * view.variance_stride + column, cause, cause + view.cause_stride};
+          view.variance_px2 + (row + 1) / 2 * view.variance_stride + column, cause, cause + view.cause_stride};
 }
 
 // Asks for what the lines a few rows below will read first around this block. Memory hands out pieces of many
