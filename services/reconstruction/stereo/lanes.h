@@ -21,12 +21,6 @@ FORGESCAN_INLINE Floats Load(const float* at) {
   __builtin_memcpy(&value, at, sizeof(value));
   return value;
 }
-// Floats of which only the upper halves are stored.
-FORGESCAN_INLINE Floats LoadUpper(const std::uint16_t* at) {
-  std::uint16_t __attribute__((vector_size(32))) upper;
-  __builtin_memcpy(&upper, at, sizeof(upper));
-  return (Floats)(__builtin_convertvector(upper, Ints) << 16);
-}
 // At any address. Not by memcpy, after which the compiler takes every pointer and number in memory for
 // changed. A typedef, because clang overlooks the alignment in `using`.
 typedef float LooseFloats __attribute__((vector_size(64), aligned(4)));
@@ -68,7 +62,20 @@ FORGESCAN_INLINE Ints CountUp(Ints count, Mask mask) {
 FORGESCAN_INLINE Mask Above(Ints a, int limit) {
   return {_mm512_cmpgt_epi32_mask((__m512i)a, _mm512_set1_epi32(limit))};
 }
+// Whether low <= value <= high, with low > 0; not of NaN. Numbers above 0 are in the order of their bits.
+FORGESCAN_INLINE Mask IsWithin(Floats value, float low, float high) {
+  const __m512i first = (__m512i)All(low), span = _mm512_sub_epi32((__m512i)All(high), first);
+  return {_mm512_cmple_epu32_mask(_mm512_sub_epi32((__m512i)value, first), span)};
+}
+// Floats of which only the upper halves are stored.
+FORGESCAN_INLINE Floats SelectUpper(Mask mask, const std::uint16_t* yes, const std::uint16_t* no) {
+  const __m256i upper = _mm256_mask_loadu_epi16(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(no)),
+                                                mask.bits, yes);
+  return (Floats)_mm512_slli_epi32(_mm512_cvtepu16_epi32(upper), 16);
+}
 FORGESCAN_INLINE Floats Sqrt(Floats value) { return _mm512_sqrt_ps(value); }
+// To the beginning of a cache line, past the cache.
+FORGESCAN_INLINE void StoreLine(float* line, Floats value) { _mm512_stream_ps(line, value); }
 // Lanes kFirst, kFirst + 1, ... of the 32 that low and high are.
 template <int kFirst>
 FORGESCAN_INLINE Floats Shifted(Floats low, Floats high) {
@@ -133,8 +140,26 @@ FORGESCAN_INLINE Mask Equal(Floats a, Floats b) { return {a == b}; }
 FORGESCAN_INLINE Floats Select(Mask mask, Floats yes, Floats no) {
   return (Floats)(((Ints)yes & mask.lanes) | ((Ints)no & ~mask.lanes));
 }
+FORGESCAN_INLINE Mask IsWithin(Floats value, float low, float high) {
+  return {(All(low) <= value) & (value <= All(high))};
+}
+FORGESCAN_INLINE Floats LoadUpper(const std::uint16_t* at) {
+  std::uint16_t __attribute__((vector_size(32))) upper;
+  __builtin_memcpy(&upper, at, sizeof(upper));
+  return (Floats)(__builtin_convertvector(upper, Ints) << 16);
+}
+FORGESCAN_INLINE Floats SelectUpper(Mask mask, const std::uint16_t* yes, const std::uint16_t* no) {
+  return Select(mask, LoadUpper(yes), LoadUpper(no));
+}
 FORGESCAN_INLINE Ints CountUp(Ints count, Mask mask) { return count - mask.lanes; }
 FORGESCAN_INLINE Mask Above(Ints a, int limit) { return {a > limit}; }
+FORGESCAN_INLINE void StoreLine(float* line, Floats value) {
+  for (int i = 0; i < 4; ++i) {
+    __m128 four;
+    __builtin_memcpy(&four, reinterpret_cast<const char*>(&value) + 16 * i, sizeof(four));
+    _mm_stream_ps(line + 4 * i, four);
+  }
+}
 FORGESCAN_INLINE Floats Sqrt(Floats value) {
   for (int i = 0; i < 4; ++i) {
     __m128 four;
@@ -210,16 +235,6 @@ FORGESCAN_INLINE Mask operator|(Mask a, Mask b) {
 FORGESCAN_INLINE bool Any(Mask mask) { return Bits(mask) != 0; }
 FORGESCAN_INLINE long Count(Mask mask) { return __builtin_popcount(Bits(mask)); }
 FORGESCAN_INLINE Mask IsNumber(Floats value) { return Equal(value, value); }
-// The lanes whose two bytes are both 0.
-FORGESCAN_INLINE Mask BothZero(const std::uint8_t* a, const std::uint8_t* b) {
-  const __m128i either = _mm_or_si128(_mm_loadu_si128(reinterpret_cast<const __m128i*>(a)),
-                                      _mm_loadu_si128(reinterpret_cast<const __m128i*>(b)));
-#ifdef __AVX512F__
-  return {_mm_testn_epi8_mask(either, either)};
-#else
-  return FromBits(static_cast<unsigned>(_mm_movemask_epi8(_mm_cmpeq_epi8(either, _mm_setzero_si128()))));
-#endif
-}
 
 }  // namespace
 }  // namespace forgescan

@@ -10,14 +10,8 @@ namespace forgescan {
 namespace {
 
 // Sums over the columns of the window, and their moments about its middle row; NaN where a pixel is missing.
-// Only where a window of the middle row can reach.
 FORGESCAN_INLINE void SumColumns(const PointTask& task, int x, int radius) {
-  const float* const middle = task.rows[radius] + x;
-  const Floats here = Load(middle);
-  if (!Any(IsNumber(here) | IsNumber(Load(middle - kLanes)) | IsNumber(Load(middle + kLanes)))) {
-    return;
-  }
-  Floats sum = here;
+  Floats sum = Load(task.rows[radius] + x);
   Floats moment = {};
   for (int k = 1; k <= radius; ++k) {
     const Floats above = Load(task.rows[radius - k] + x), below = Load(task.rows[radius + k] + x);
@@ -125,10 +119,9 @@ struct SurfacePoint {
 // d / f. All of it is multiplied by the slope of the columns, which saves a division.
 FORGESCAN_INLINE SurfacePoint PointOf(Floats column, Floats disparity, Floats depth, const Gradient& gradient,
                                       const ColumnSlopes& slopes, const PointGeometry& geometry) {
-  const float inverse_focal = 1 / geometry.focal_px;
-  const Floats x = column * inverse_focal;
-  const float y = geometry.row_px * inverse_focal;
-  const Floats along_ray = disparity * inverse_focal * slopes.along;
+  const Floats x = column * geometry.inverse_focal;
+  const float y = geometry.row_px * geometry.inverse_focal;
+  const Floats along_ray = disparity * geometry.inverse_focal * slopes.along;
   const Floats gx = gradient.x;
   const Floats gy = gradient.y * slopes.along - gradient.x * slopes.across;
   const Floats gz = along_ray - gx * x - gy * y;
@@ -169,10 +162,7 @@ FORGESCAN_INLINE void PointBlock(const PointTask& task, int block, int radius, c
   const int x = block * kLanes;
   const Floats disparity = Load(task.rows[radius] + x);
   const Mask matched = IsNumber(disparity);
-  if (!Any(matched)) {
-    return;
-  }
-  const Floats depth = geometry.focal_times_baseline / disparity;
+  const Floats inverse_disparity = 1 / disparity, depth = geometry.focal_times_baseline * inverse_disparity;
   const Mask in_range =
       matched & LessEqual(All(geometry.min_depth_mm), depth) & LessEqual(depth, All(geometry.max_depth_mm));
   const Gradient gradient = GradientAt(task, x, in_range, radius, geometry);
@@ -180,14 +170,17 @@ FORGESCAN_INLINE void PointBlock(const PointTask& task, int block, int radius, c
   SurfacePoint point =
       PointOf(Load(task.left->column_px + x), disparity, depth, gradient, SlopesAt(task, block), geometry);
   point.good = Without(has_normal, point.is_steep | IsOnStep(task.rows + radius, x, disparity, geometry));
-  const Mask good =
-      geometry.projector != nullptr ? CheckWithProjector(task, x, point, geometry, points) : point.good;
+  Mask good = point.good;
+  if (geometry.projector != nullptr) {
+    const SurfacePoint passed = point;  // so that the point itself never has to be in memory
+    good = CheckWithProjector(task, x, passed, geometry, points);
+  }
   const Floats variance = Load(task.disparity->variance_px2 + x);
-  const Floats sigma = Magnitude(depth / disparity) * Sqrt(variance * point.ray_square);
+  const Floats sigma = Magnitude(depth * inverse_disparity) * Sqrt(variance * point.ray_square);
   const int at = points.count;
-  StorePacked(points.points_mm + 3 * at, good, point.x, point.y, point.z);
-  StorePacked(points.normals + 3 * at, good, point.nx, point.ny, point.nz);
-  StorePacked(points.sigma_mm + at, good, sigma);
+  StorePacked(points.points_mm.values + 3 * at, good, point.x, point.y, point.z);
+  StorePacked(points.normals.values + 3 * at, good, point.nx, point.ny, point.nz);
+  StorePacked(points.sigma_mm.values + at, good, sigma);
   StorePacked(points.coordinate_px + at, good, Load(task.left->coordinate_px + x));
   points.count += static_cast<int>(Count(good));
   points.depth_range += Count(Without(matched, in_range));
@@ -195,17 +188,44 @@ FORGESCAN_INLINE void PointBlock(const PointTask& task, int block, int radius, c
   points.steep += Count(Without(has_normal, point.good));
 }
 
+FORGESCAN_INLINE void StreamArray(std::ptrdiff_t ready, PointArray& array) {
+  for (; array.target != nullptr && array.streamed + kLanes <= ready; array.streamed += kLanes) {
+    StoreLine(array.target + array.streamed, Load(array.values + array.streamed));
+  }
+}
+
+FORGESCAN_INLINE void StreamPoints(std::ptrdiff_t ready, PointRow& points) {
+  StreamArray(3 * ready, points.points_mm);
+  StreamArray(3 * ready, points.normals);
+  StreamArray(ready, points.sigma_mm);
+}
+
 FORGESCAN_INLINE void PointBlocks(const PointTask& task, int radius, const PointGeometry& geometry,
                                   PointRow& points) {
   constexpr int kAhead = 2;  // blocks: what was stored a moment ago cannot be read again at once
-  for (int block = 0; block < kAhead; ++block) {
-    SumColumns(task, block * kLanes, radius);
+  const auto matched = [&](int block) -> std::uint64_t {
+    return Bits(IsNumber(Load(task.rows[radius] + block * kLanes)));
+  };
+  constexpr int kStreamed = 4;  // blocks: what is streamed was stored so many blocks ago, or twice as many
+  int ready = 0;
+  std::uint64_t window = matched(0) << 48;  // of this block, from bit 0, and the next three
+  for (int block = -kAhead; block < task.blocks; ++block) {
+    window = window >> 16 | matched(block + kAhead + 1) << 48;
+    if (window >> 16 != 0) {  // a window of the middle row can reach these columns
+      SumColumns(task, (block + kAhead) * kLanes, radius);
+    }
+    if (block >= 0) {
+      FetchAhead(task.next, block);
+    }
+    if ((window & 0xffff) != 0) {
+      PointBlock(task, block, radius, geometry, points);
+    }
+    if (block % kStreamed == 0) {
+      StreamPoints(ready, points);
+      ready = points.count;
+    }
   }
-  for (int block = 0; block < task.blocks; ++block) {
-    FetchAhead(task.next, block);
-    SumColumns(task, (block + kAhead) * kLanes, radius);
-    PointBlock(task, block, radius, geometry, points);
-  }
+  StreamPoints(points.count, points);
 }
 
 inline void TriangulateRow(const PointTask& task, const PointGeometry& geometry, PointRow& points) {
