@@ -32,16 +32,6 @@ FORGESCAN_INLINE Floats Magnitude(Floats value) { return (Floats)((Ints)value & 
 FORGESCAN_INLINE Floats Truncated(Floats value) {
   return __builtin_convertvector(__builtin_convertvector(value, Ints), Floats);
 }
-// 1 / sqrt(value) of a positive, normal number, to about 2e-7 of it: a first guess from the bits, then three
-// steps of Newton's method. Unlike the instruction for it, the same on every processor.
-FORGESCAN_INLINE Floats InverseSqrt(Floats value) {
-  Floats y = (Floats)(0x5f3759df - ((Ints)value >> 1));
-  const Floats half = 0.5F * value;
-  for (int i = 0; i < 3; ++i) {
-    y = y * (1.5F - half * y * y);
-  }
-  return y;
-}
 
 #ifdef __AVX512F__
 
@@ -79,7 +69,7 @@ FORGESCAN_INLINE void StoreLine(float* line, Floats value) { _mm512_stream_ps(li
 // Lanes kFirst, kFirst + 1, ... of the 32 that low and high are.
 template <int kFirst>
 FORGESCAN_INLINE Floats Shifted(Floats low, Floats high) {
-  return (Floats)_mm512_alignr_epi32((__m512i)high, (__m512i)low, kFirst);
+  return (Floats)_mm512_maskz_alignr_epi32(0xffff, (__m512i)high, (__m512i)low, kFirst);
 }
 // from[index] for 0 <= index < 32; other lanes are anything.
 class NearTable {
@@ -95,24 +85,19 @@ class NearTable {
 FORGESCAN_INLINE Floats LookUp(const float* from, Ints index) {
   return _mm512_mask_i32gather_ps(Floats{}, 0xffff, (__m512i)index, from, 4);
 }
-// The chosen lanes one behind the other; writes all 16.
-FORGESCAN_INLINE void StorePacked(float* at, Mask mask, Floats value) {
-  Store(at, _mm512_maskz_compress_ps(mask.bits, value));
-}
-// x, y, z of the chosen lanes one behind the other; writes all 48.
-FORGESCAN_INLINE void StorePacked(float* at, Mask mask, Floats x, Floats y, Floats z) {
+// The chosen lanes, one behind the other; then anything.
+FORGESCAN_INLINE Floats Packed(Mask mask, Floats value) { return _mm512_maskz_compress_ps(mask.bits, value); }
+// x, y, z of lane after lane.
+FORGESCAN_INLINE void StoreTriples(float* at, Floats x, Floats y, Floats z) {
   alignas(64) static constexpr int kXy[3][16] = {{0, 16, 0, 1, 17, 0, 2, 18, 0, 3, 19, 0, 4, 20, 0, 5},
                                                  {21, 0, 6, 22, 0, 7, 23, 0, 8, 24, 0, 9, 25, 0, 10, 26},
                                                  {0, 11, 27, 0, 12, 28, 0, 13, 29, 0, 14, 30, 0, 15, 31, 0}};
   alignas(64) static constexpr int kZ[3][16] = {{0, 1, 16, 3, 4, 17, 6, 7, 18, 9, 10, 19, 12, 13, 20, 15},
                                                 {0, 21, 2, 3, 22, 5, 6, 23, 8, 9, 24, 11, 12, 25, 14, 15},
                                                 {26, 1, 2, 27, 4, 5, 28, 7, 8, 29, 10, 11, 30, 13, 14, 31}};
-  const Floats px = _mm512_maskz_compress_ps(mask.bits, x);
-  const Floats py = _mm512_maskz_compress_ps(mask.bits, y);
-  const Floats pz = _mm512_maskz_compress_ps(mask.bits, z);
   for (int i = 0; i < 3; ++i) {
-    const Floats xy = _mm512_permutex2var_ps(px, _mm512_load_si512(kXy[i]), py);
-    Store(at + i * kLanes, _mm512_permutex2var_ps(xy, _mm512_load_si512(kZ[i]), pz));
+    const Floats xy = _mm512_permutex2var_ps(x, _mm512_load_si512(kXy[i]), y);
+    Store(at + i * kLanes, _mm512_permutex2var_ps(xy, _mm512_load_si512(kZ[i]), z));
   }
 }
 
@@ -191,20 +176,21 @@ class NearTable {
  private:
   const float* from_;
 };
-FORGESCAN_INLINE void StorePacked(float* at, Mask mask, Floats value) {
+FORGESCAN_INLINE Floats Packed(Mask mask, Floats value) {
+  float packed[kLanes + 1] = {};
   const unsigned bits = Bits(mask);
+  int count = 0;
   for (int i = 0; i < kLanes; ++i) {
-    *at = value[i];
-    at += bits >> i & 1;
+    packed[count] = value[i];
+    count += static_cast<int>(bits >> i & 1);
   }
+  return Load(packed);
 }
-FORGESCAN_INLINE void StorePacked(float* at, Mask mask, Floats x, Floats y, Floats z) {
-  const unsigned bits = Bits(mask);
+FORGESCAN_INLINE void StoreTriples(float* at, Floats x, Floats y, Floats z) {
   for (int i = 0; i < kLanes; ++i) {
-    at[0] = x[i];
-    at[1] = y[i];
-    at[2] = z[i];
-    at += 3 * (bits >> i & 1);
+    at[3 * i] = x[i];
+    at[3 * i + 1] = y[i];
+    at[3 * i + 2] = z[i];
   }
 }
 

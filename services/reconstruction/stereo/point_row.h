@@ -11,10 +11,10 @@ namespace {
 
 // Sums over the columns of the window, and their moments about its middle row; NaN where a pixel is missing.
 FORGESCAN_INLINE void SumColumns(const PointTask& task, int x, int radius) {
-  Floats sum = Load(task.rows[radius] + x);
-  Floats moment = {};
-  for (int k = 1; k <= radius; ++k) {
-    const Floats above = Load(task.rows[radius - k] + x), below = Load(task.rows[radius + k] + x);
+  Floats above = Load(task.rows[radius - 1] + x), below = Load(task.rows[radius + 1] + x);
+  Floats sum = Load(task.rows[radius] + x) + (above + below), moment = below - above;
+  for (int k = 2; k <= radius; ++k) {
+    above = Load(task.rows[radius - k] + x), below = Load(task.rows[radius + k] + x);
     sum += above + below;
     moment += static_cast<float>(k) * (below - above);
   }
@@ -29,9 +29,10 @@ struct Gradient {
 
 // Least squares over a window without a missing pixel; known: whether it is that.
 FORGESCAN_INLINE Gradient FullGradient(const PointTask& task, int x, int radius) {
-  Floats along = {}, across = Load(task.moments + x);
-  float weight = 0;
-  for (int k = 1; k <= radius; ++k) {
+  Floats along = Load(task.sums + x + 1) - Load(task.sums + x - 1);
+  Floats across = Load(task.moments + x) + (Load(task.moments + x + 1) + Load(task.moments + x - 1));
+  float weight = 2;
+  for (int k = 2; k <= radius; ++k) {
     along += static_cast<float>(k) * (Load(task.sums + x + k) - Load(task.sums + x - k));
     across += Load(task.moments + x + k) + Load(task.moments + x - k);
     weight += static_cast<float>(2 * k * k);
@@ -127,7 +128,7 @@ FORGESCAN_INLINE SurfacePoint PointOf(Floats column, Floats disparity, Floats de
   const Floats gz = along_ray - gx * x - gy * y;
   const Floats square = gx * gx + gy * gy + gz * gz;
   const Floats ray_square = x * x + (y * y + 1);
-  const Floats length = Select(Less(Floats{}, along_ray), -InverseSqrt(square), InverseSqrt(square));
+  const Floats length = Select(Less(Floats{}, along_ray), All(-1), All(1)) / Sqrt(square);
   return {.x = depth * x,
           .y = depth * y,
           .z = depth,
@@ -147,7 +148,7 @@ inline __attribute__((noinline)) Mask CheckWithProjector(const PointTask& task, 
   const ProjectorModel& model = *geometry.projector;
   const Floats shown = geometry.sign * Load(task.left->coordinate_px + x);
   const Floats residual = shown - ProjectorColumn(model, point.x, point.y, point.z);
-  StorePacked(points.residual_px + points.residual_count, point.good, residual);
+  Store(points.residual_px + points.residual_count, Packed(point.good, residual));
   points.residual_count += static_cast<int>(Count(point.good));
   const Floats variance = Load(task.left->variance_px2 + x);
   const Floats square = residual * residual;
@@ -155,6 +156,22 @@ inline __attribute__((noinline)) Mask CheckWithProjector(const PointTask& task, 
                    LessEqual(square, model.max_residual_sigma * model.max_residual_sigma * variance);
   points.projector += Count(Without(point.good, lit));
   return point.good & lit;
+}
+
+// Those that are good, one behind the other.
+FORGESCAN_INLINE void AddPoints(Mask good, SurfacePoint point, Floats sigma, Floats coordinate, PointRow& points) {
+  if (Bits(good) != 0xffff) {  // nearly all blocks are full
+    for (Floats* const value :
+         {&point.x, &point.y, &point.z, &point.nx, &point.ny, &point.nz, &sigma, &coordinate}) {
+      *value = Packed(good, *value);
+    }
+  }
+  const int at = points.count;
+  StoreTriples(points.points_mm.values + 3 * at, point.x, point.y, point.z);
+  StoreTriples(points.normals.values + 3 * at, point.nx, point.ny, point.nz);
+  Store(points.sigma_mm.values + at, sigma);
+  Store(points.coordinate_px + at, coordinate);
+  points.count += static_cast<int>(Count(good));
 }
 
 FORGESCAN_INLINE void PointBlock(const PointTask& task, int block, int radius, const PointGeometry& geometry,
@@ -177,12 +194,7 @@ FORGESCAN_INLINE void PointBlock(const PointTask& task, int block, int radius, c
   }
   const Floats variance = Load(task.disparity->variance_px2 + x);
   const Floats sigma = Magnitude(depth * inverse_disparity) * Sqrt(variance * point.ray_square);
-  const int at = points.count;
-  StorePacked(points.points_mm.values + 3 * at, good, point.x, point.y, point.z);
-  StorePacked(points.normals.values + 3 * at, good, point.nx, point.ny, point.nz);
-  StorePacked(points.sigma_mm.values + at, good, sigma);
-  StorePacked(points.coordinate_px + at, good, Load(task.left->coordinate_px + x));
-  points.count += static_cast<int>(Count(good));
+  AddPoints(good, point, sigma, Load(task.left->coordinate_px + x), points);
   points.depth_range += Count(Without(matched, in_range));
   points.no_normal += Count(Without(in_range, has_normal));
   points.steep += Count(Without(has_normal, point.good));
@@ -206,7 +218,7 @@ FORGESCAN_INLINE void PointBlocks(const PointTask& task, int radius, const Point
   const auto matched = [&](int block) -> std::uint64_t {
     return Bits(IsNumber(Load(task.rows[radius] + block * kLanes)));
   };
-  constexpr int kStreamed = 4;  // blocks: what is streamed was stored so many blocks ago, or twice as many
+  constexpr int kStreamed = 1;  // blocks: what is streamed was stored so many blocks ago, or twice as many
   int ready = 0;
   std::uint64_t window = matched(0) << 48;  // of this block, from bit 0, and the next three
   for (int block = -kAhead; block < task.blocks; ++block) {
