@@ -19,7 +19,7 @@ struct PackedLimit {
 // Eq. (4) of the paper as whole numbers: 2 A = I11 + I13, 2 C1 = I11 - I13, 2 S1 = 2 A - 2 I12, 2 Cj = 2 Ij1
 // - 2 A, 2 Sj = 2 A - 2 Ij2. Slot 0 is the frequency with three frames. Units: a phase is 2^-16 turn, a
 // modulation or contrast 1/64 DN. A phase is within 1.5e-4 rad of the exact one, a hundredth of the noise of
-// good light; a modulation within 1/5000 and 1/32 DN.
+// good light; a modulation within 1/1500 and 1/32 DN.
 struct PackedConstants {
   std::array<std::size_t, 3> slot{};  // of the finest frequency and of the other two
   std::size_t first_slot = 0;         // of the pattern's first frequency, which ratios and reference refer to
