@@ -51,12 +51,21 @@ CloudWriter::CloudWriter(PointCloud memory, std::size_t used) : cloud_(std::move
   Resize(std::max(cloud_.points.size(), used), cloud_);
 }
 
-std::size_t CloudWriter::Grow(std::size_t count) {
-  const std::size_t begin = std::exchange(size_, size_ + count);
-  if (size_ > cloud_.points.size()) {
-    Resize(std::max(size_, 2 * begin), cloud_);
+void CloudWriter::Fit(std::size_t size) {
+  if (size > cloud_.points.size()) {
+    Resize(size <= cloud_.points.capacity() ? size : std::max(size, 2 * size_), cloud_);
   }
-  return begin;
+}
+
+std::size_t CloudWriter::Grow(std::size_t count) {
+  Fit(size_ + count);
+  return std::exchange(size_, size_ + count);
+}
+
+PointTargets CloudWriter::Room(std::size_t count) {
+  Fit(size_ + count);
+  return {cloud_.points.data()->data() + 3 * size_, cloud_.normals.data()->data() + 3 * size_,
+          cloud_.sigma_mm.data() + size_};
 }
 
 void CloudWriter::Append(const PointSpans& row) {

@@ -15,6 +15,13 @@ struct PointSpans {
   std::span<const float> sigma_mm;
 };
 
+// Memory of three floats a point, three, and one.
+struct PointTargets {
+  float* points_mm = nullptr;
+  float* normals = nullptr;
+  float* sigma_mm = nullptr;
+};
+
 // Entries of the memory are overwritten where they stand: no page is cleared or touched anew.
 class CloudWriter {
  public:
@@ -23,11 +30,15 @@ class CloudWriter {
 
   // Past the cache: a full cloud is larger than it, and nobody reads it before it is whole.
   void Append(const PointSpans& row);
+  // Where the next points are to be, room for so many; then tells how many there are.
+  PointTargets Room(std::size_t count);
+  void Added(std::size_t count) { size_ += count; }
   // Every step-th of the row from `first` on; few enough to stay in the cache.
   void AppendThinned(const PointSpans& row, std::size_t first, std::size_t step);
   PointCloud Finish() &&;
 
  private:
+  void Fit(std::size_t size);
   std::size_t Grow(std::size_t count);  // where the new points begin
 
   PointCloud cloud_;

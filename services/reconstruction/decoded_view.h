@@ -41,13 +41,16 @@ inline std::uint16_t UpperOfFloat(float value) {
   return static_cast<std::uint16_t>((std::bit_cast<std::uint32_t>(value) + 0x8000U) >> 16);
 }
 
-// Shape: every map has the size of the frames. Frames: raw camera pixels.
+// Shape: coordinate_px and cause have the size of the frames. Frames: raw camera pixels.
 struct DecodedView {
-  // Projector column; where masked an estimate, or NaN for want of contrast, so always look at cause.
-  cv::Mat_<float> coordinate_px;
-  cv::Mat_<std::uint16_t> variance_px2;  // its predicted variance, projector px^2, by FloatFromUpper
-  cv::Mat_<std::uint8_t> cause;          // MaskCause
-  float SigmaPx(int row, int column) const { return std::sqrt(FloatFromUpper(variance_px2(row, column))); }
+  cv::Mat_<float> coordinate_px;  // projector column; NaN where masked
+  // Its predicted variance, projector px^2, by FloatFromUpper: of even rows only, so half as many rows. Fringes
+  // run across the rows, so the row below has nearly the same. Anything where that pixel of the even row is
+  // masked.
+  cv::Mat_<std::uint16_t> variance_px2;
+  cv::Mat_<std::uint8_t> cause;  // MaskCause
+  float VariancePx2(int row, int column) const { return FloatFromUpper(variance_px2(row / 2, column)); }
+  float SigmaPx(int row, int column) const { return std::sqrt(VariancePx2(row, column)); }
   std::array<long, kMaskCauses> count{};  // pixels by cause; their sum is the image
   long repaired = 0;  // valid pixels whose fringe order was doubtful and came from their neighbours
   std::optional<double> clipping_dn;  // where the camera cut off the fringes, if below full scale

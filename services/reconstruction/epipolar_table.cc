@@ -68,23 +68,45 @@ struct Frame {
   double first_px;  // of its columns, from the principal point
 };
 
-// The raw rows below which the line runs inside of the frame; its own rows count from the first of them.
-void SetRows(int lanes, const Frame& frame, EpipolarBlock& block) {
-  int low = std::numeric_limits<int>::max(), high = -1;
-  for (int i = 0; i < lanes; ++i) {
-    const auto lane = static_cast<float>(i);
-    const float row = block.row[0] + lane * (block.row[1] + lane * block.row[2]);
-    const float column = block.column[0] + lane * (block.column[1] + lane * block.column[2]);
-    const double from_left = static_cast<double>(column) - frame.first_px;
-    const bool inside = from_left >= 0 && from_left <= frame.size.width_px - 1;
-    if (inside && row >= 0 && row < static_cast<float>(frame.size.height_px - 1)) {
-      low = std::min(low, static_cast<int>(row));
-      high = std::max(high, static_cast<int>(row));
+// Exactly as the kernels compute it.
+float Parabola(const float (&coefficients)[3], int lane) {
+  const auto x = static_cast<float>(lane);
+  return coefficients[0] + x * (coefficients[1] + x * coefficients[2]);
+}
+
+struct RowRange {
+  int low = std::numeric_limits<int>::max(), high = std::numeric_limits<int>::min();
+  bool is_empty() const { return low > high; }
+};
+
+// Raw rows below which the line runs inside of the frame, counted from `first`, from which block.row counts.
+RowRange RowsInside(int lanes, const Frame& frame, int first, const EpipolarBlock& block) {
+  RowRange rows;
+  for (int lane = 0; lane < lanes; ++lane) {
+    const double from_left = static_cast<double>(Parabola(block.column, lane)) - frame.first_px;
+    const int row = static_cast<int>(std::floor(Parabola(block.row, lane)));
+    if (from_left >= 0 && from_left <= frame.size.width_px - 1 && first + row >= 0 &&
+        first + row < frame.size.height_px - 1) {
+      rows.low = std::min(rows.low, row);
+      rows.high = std::max(rows.high, row);
     }
   }
-  block.first_row = static_cast<std::uint16_t>(high < 0 ? 0 : low);
-  block.row[0] -= static_cast<float>(block.first_row);
-  block.row_count = static_cast<std::uint16_t>(high < 0 ? 0 : high - low + 1);
+  return rows;
+}
+
+// The raw rows below which the line runs inside of the frame; its own rows count from the first of them. A line
+// on a raw row may be above it once it counts from that row, in single precision: then from the one before.
+void SetRows(int lanes, const Frame& frame, EpipolarBlock& block) {
+  const float row = block.row[0];
+  int first = 0;
+  RowRange rows = RowsInside(lanes, frame, first, block);
+  for (int i = 0; i < 2 && !rows.is_empty() && (i == 0 || rows.low < 0); ++i) {
+    first += rows.low;
+    block.row[0] = row - static_cast<float>(first);
+    rows = RowsInside(lanes, frame, first, block);
+  }
+  block.first_row = static_cast<std::uint16_t>(first);
+  block.row_count = static_cast<std::uint16_t>(rows.is_empty() ? 0 : rows.high + 1);
 }
 
 using Nodes = std::vector<std::optional<LinePoint>>;  // at raw columns 0, 8, 16, ...

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -22,15 +23,23 @@ constexpr double kRounding = 1e-5;  // of a grey value scaled in single precisio
 
 // By the plain arithmetic. Returns whether the row has pixels of doubtful order.
 bool DecodeRow(std::span<const cv::Mat> frames, int row, StripDecoder& strip, DecodedView& view) {
+  constexpr auto kValid = static_cast<std::int32_t>(MaskCause::kValid);
   constexpr auto kDoubtful = static_cast<std::int32_t>(MaskCause::kUnwrapMargin);
   bool doubts = false;
   for (int column = 0; column < view.cause.cols; column += StripDecoder::kLength) {
     const int length = std::min(StripDecoder::kLength, view.cause.cols - column);
     strip.Load(frames, row, column, length);
     strip.Decode();
-    std::copy_n(strip.coordinate_px.begin(), length, view.coordinate_px[row] + column);
-    std::transform(strip.sigma_px.begin(), strip.sigma_px.begin() + length, view.variance_px2[row] + column,
-                   [](float sigma_px) { return UpperOfFloat(sigma_px * sigma_px); });
+    std::transform(strip.coordinate_px.begin(), strip.coordinate_px.begin() + length, strip.cause.begin(),
+                   view.coordinate_px[row] + column, [](float coordinate_px, std::int32_t cause) {
+                     const bool may_be_valid = cause == kValid || cause == kDoubtful;
+                     return may_be_valid ? coordinate_px : std::numeric_limits<float>::quiet_NaN();
+                   });
+    if (row % 2 == 0) {
+      std::transform(strip.sigma_px.begin(), strip.sigma_px.begin() + length,
+                     view.variance_px2[row / 2] + column,
+                     [](float sigma_px) { return UpperOfFloat(sigma_px * sigma_px); });
+    }
     std::transform(strip.cause.begin(), strip.cause.begin() + length, view.cause[row] + column,
                    [](std::int32_t cause) { return static_cast<std::uint8_t>(cause); });
     doubts = std::find(strip.cause.begin(), strip.cause.begin() + length, kDoubtful) !=
@@ -46,7 +55,7 @@ void TakeMedians(std::span<const cv::Mat> frames, const FringeDecoder& decoder, 
   HistogramMedian sigma(0, 2, 4000);
   PixelSampler sampler(frames, decoder.estimator(), scale);
   const int step = 2 * SamplingStep(view.cause.size());  // 5000 are plenty for a median
-  for (int row = step / 2; row < view.cause.rows; row += step) {
+  for (int row = step / 2 & ~1; row < view.cause.rows; row += step) {  // even ones, for their variances
     for (int column = step / 2; column < view.cause.cols; column += step) {
       if (view.cause(row, column) == static_cast<std::uint8_t>(MaskCause::kValid)) {
         modulation.Add(sampler.LeastModulation(row, column));
@@ -94,7 +103,6 @@ Result<FringeDecoder> FringeDecoder::Create(PatternSet pattern, const Reconstruc
                                                         config.dead_margin_fraction));
   decoder.config_ = config;
   decoder.pattern_ = std::move(pattern);
-  decoder.path_ = path.value_or(SimdPath::kPlain);
   if (path) {
     decoder.packed_ =
         PackedDecoder::Make({decoder.pattern_, config, decoder.estimator_, decoder.table_}, *path);
@@ -103,7 +111,7 @@ Result<FringeDecoder> FringeDecoder::Create(PatternSet pattern, const Reconstruc
 }
 
 std::vector<std::uint8_t> FringeDecoder::DecodeRows(std::span<const cv::Mat> frames,
-                                                    const ReconstructionConfig& config,
+                                                    const ReconstructionConfig& config, MaskMap& masked,
                                                     DecodedView& view) const {
   std::vector<std::uint8_t> doubtful(static_cast<std::size_t>(view.cause.rows));
   const bool packed = packed_ && frames[0].depth() == CV_8U && view.cause.cols >= PackedDecoder::kMinWidthPx;
@@ -114,6 +122,7 @@ std::vector<std::uint8_t> FringeDecoder::DecodeRows(std::span<const cv::Mat> fra
     for (int row = begin; row < end; ++row) {
       doubtful[static_cast<std::size_t>(row)] =
           packed ? packed_->Row(frames, row, saturation_dn, view) : DecodeRow(frames, row, *strip, view);
+      masked.SetRow(row, view.cause[row]);
     }
   });
   return doubtful;
@@ -131,10 +140,11 @@ Result<DecodedView> FringeDecoder::Decode(std::span<const cv::Mat> frames) const
           std::min(config.saturation_fraction, (1 - kRounding) * clipping_dn / kFullScaleDn);
     }
   }
-  const std::vector<std::uint8_t> doubtful = DecodeRows(frames, config, view);
+  MaskMap masked(view.cause.size());
+  const std::vector<std::uint8_t> doubtful = DecodeRows(frames, config, masked, view);
   const double period_px = pattern_.frequencies[static_cast<std::size_t>(table_.base)].period_px;
-  view.repaired = RepairFringeOrders(doubtful, period_px, config_, view);
-  DropMaskBorder(config_, path_, view);
+  view.repaired = RepairFringeOrders(doubtful, period_px, config_, masked, view);
+  DropMaskBorder(config_, masked, view);
   TakeMedians(frames, *this, GreyScale(frames[0], config_), view);
   return view;
 }

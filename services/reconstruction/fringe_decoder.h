@@ -11,6 +11,7 @@
 #include "services/common/result.h"
 #include "services/reconstruction/decoded_view.h"
 #include "services/reconstruction/fringe_order_table.h"
+#include "services/reconstruction/mask_map.h"
 #include "services/reconstruction/packed_decoder.h"
 #include "services/reconstruction/pattern_set.h"
 #include "services/reconstruction/phase_estimator.h"
@@ -44,16 +45,15 @@ class FringeDecoder {
 
  private:
   FringeDecoder() = default;
-  // Which rows have pixels of doubtful order.
+  // Before any repair. Returns which rows have pixels of doubtful order.
   std::vector<std::uint8_t> DecodeRows(std::span<const cv::Mat> frames, const ReconstructionConfig& config,
-                                       DecodedView& view) const;
+                                       MaskMap& masked, DecodedView& view) const;
 
   PatternSet pattern_;
   ReconstructionConfig config_;
   PhaseEstimator estimator_;
   FringeOrderTable table_;
   std::shared_ptr<ViewPool> pool_ = std::make_shared<ViewPool>();
-  SimdPath path_ = SimdPath::kPlain;
   std::optional<PackedDecoder> packed_;
 };
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -22,13 +23,13 @@ const std::uint8_t* FindByte(const std::uint8_t* begin, const std::uint8_t* end,
 struct Repair {
   int row;
   int column;
-  float coordinate_px;
-  std::uint16_t variance_px2;
+  float coordinate_px;         // NaN: none
+  std::uint16_t variance_px2;  // see Neighbours
 };
 
 struct Neighbours {
   float median_px;
-  std::uint16_t variance_px2;  // largest
+  std::uint16_t variance_px2;  // largest, of even rows; 0: none of them is in an even row
 };
 
 std::optional<Neighbours> ValidNeighbours(const DecodedView& view, int row, int column, int min_neighbours) {
@@ -40,7 +41,7 @@ std::optional<Neighbours> ValidNeighbours(const DecodedView& view, int row, int 
          ++x) {
       if (view.cause(y, x) == kValid) {
         values[static_cast<std::size_t>(count++)] = view.coordinate_px(y, x);
-        variance_px2 = std::max(variance_px2, view.variance_px2(y, x));
+        variance_px2 = y % 2 == 0 ? std::max(variance_px2, view.variance_px2(y / 2, x)) : variance_px2;
       }
     }
   }
@@ -66,22 +67,26 @@ class RowRepair {
     const std::uint8_t* const cause = view_.cause[row];
     const std::uint8_t* const end = cause + view_.cause.cols;
     for (const std::uint8_t* at = cause; (at = FindByte(at, end, kDoubtful)) != end; ++at) {
-      const int column = static_cast<int>(at - cause);
-      const auto neighbours = ValidNeighbours(view_, row, column, min_neighbours_);
-      if (!neighbours) {
-        continue;
-      }
-      const float coordinate = view_.coordinate_px(row, column);
-      const float moved =
-          coordinate - period_px_ * std::round((coordinate - neighbours->median_px) / period_px_);
-      if (std::abs(moved - neighbours->median_px) <= tolerance_px_) {
-        repairs.push_back({row, column, moved, neighbours->variance_px2});
-      }
+      repairs.push_back(Pixel(row, static_cast<int>(at - cause)));
     }
     return repairs;
   }
 
  private:
+  Repair Pixel(int row, int column) const {
+    Repair repair = {row, column, std::numeric_limits<float>::quiet_NaN(), 0};
+    if (const auto neighbours = ValidNeighbours(view_, row, column, min_neighbours_)) {
+      const float coordinate = view_.coordinate_px(row, column);
+      const float moved =
+          coordinate - period_px_ * std::round((coordinate - neighbours->median_px) / period_px_);
+      if (std::abs(moved - neighbours->median_px) <= tolerance_px_) {
+        repair.coordinate_px = moved;
+        repair.variance_px2 = neighbours->variance_px2;
+      }
+    }
+    return repair;
+  }
+
   const DecodedView& view_;
   float period_px_;
   float tolerance_px_;
@@ -91,7 +96,7 @@ class RowRepair {
 }  // namespace
 
 long RepairFringeOrders(const std::vector<std::uint8_t>& doubtful_rows, double period_px,
-                        const ReconstructionConfig& config, DecodedView& view) {
+                        const ReconstructionConfig& config, MaskMap& masked, DecodedView& view) {
   const RowRepair repair(view, period_px, config);
   std::vector<std::vector<Repair>> rows(static_cast<std::size_t>(view.cause.rows));
   ParallelRows(config.threads, view.cause.rows, [&](int begin, int end) {
@@ -105,8 +110,14 @@ long RepairFringeOrders(const std::vector<std::uint8_t>& doubtful_rows, double p
   for (const auto& row : rows) {
     for (const Repair& one : row) {
       view.coordinate_px(one.row, one.column) = one.coordinate_px;
-      view.variance_px2(one.row, one.column) = one.variance_px2;
+      if (std::isnan(one.coordinate_px)) {
+        continue;
+      }
+      if (one.row % 2 == 0 && one.variance_px2 > 0) {
+        view.variance_px2(one.row / 2, one.column) = one.variance_px2;
+      }
       view.cause(one.row, one.column) = kValid;
+      masked.Unmask(one.row, one.column, MaskCause::kUnwrapMargin);
       ++count;
     }
   }

@@ -272,7 +272,7 @@ bool PackedDecoder::Row(std::span<const cv::Mat> frames, int row, int saturation
       strip.frames[i] = i < 7 || constants.has_reference ? frames[frame_[i]].ptr(row) + column : nullptr;
     }
     strip.coordinate_px = view.coordinate_px[row] + column;
-    strip.variance_px2 = view.variance_px2[row] + column;
+    strip.variance_px2 = row % 2 == 0 ? view.variance_px2[row / 2] + column : nullptr;
     strip.cause = view.cause[row] + column;
     doubts = kernel_.Decode(constants, strip) || doubts;
   }

@@ -3,14 +3,13 @@
 // (-ffp-contract=off), give equal bits on each.
 #include "services/reconstruction/packed_kernel.h"
 
+#include <immintrin.h>
+
 #include <algorithm>
 #include <bit>
 #include <utility>
 
-#if defined(__x86_64__)
-#include <immintrin.h>
-#endif
-
+#include "services/common/simd_target.h"
 #include "services/reconstruction/decoded_view.h"
 
 namespace forgescan {
@@ -54,20 +53,19 @@ void LookUp(const std::uint8_t* cells, const U16* cell, std::uint8_t* order, int
   }
 }
 
-// The functions between them are compiled for these instructions; GCC wants to be told the width as well.
+// The functions between them are compiled for these instructions.
 #define FORGESCAN_PRAGMA(text) _Pragma(#text)
 #if defined(__clang__)
-#define FORGESCAN_BEGIN_TARGET(target_, width_) \
+#define FORGESCAN_BEGIN_TARGET(target_) \
   FORGESCAN_PRAGMA(clang attribute push(__attribute__((target(target_))), apply_to = function))
 #define FORGESCAN_END_TARGET FORGESCAN_PRAGMA(clang attribute pop)
 #else
-#define FORGESCAN_BEGIN_TARGET(target_, width_) \
-  FORGESCAN_PRAGMA(GCC push_options) FORGESCAN_PRAGMA(GCC target(target_ "," width_))
+#define FORGESCAN_BEGIN_TARGET(target_) \
+  FORGESCAN_PRAGMA(GCC push_options) FORGESCAN_PRAGMA(GCC target(target_))
 #define FORGESCAN_END_TARGET FORGESCAN_PRAGMA(GCC pop_options)
 #endif
 
-#if defined(__x86_64__)
-FORGESCAN_BEGIN_TARGET("avx2", "prefer-vector-width=256")
+FORGESCAN_BEGIN_TARGET(FORGESCAN_AVX2)
 namespace avx2 {
 constexpr int kBytes = 32;
 #define FORGESCAN_HIGH(a, b) (V) _mm256_mulhi_epu16((__m256i)(a), (__m256i)(b))
@@ -86,7 +84,7 @@ constexpr int kBytes = 32;
 }  // namespace avx2
 FORGESCAN_END_TARGET
 
-FORGESCAN_BEGIN_TARGET("avx512f,avx512bw,avx512vl,avx512dq", "prefer-vector-width=512")
+FORGESCAN_BEGIN_TARGET(FORGESCAN_AVX512)
 namespace avx512 {
 constexpr int kBytes = 64;
 #define FORGESCAN_HIGH(a, b) (V) _mm512_mulhi_epu16((__m512i)(a), (__m512i)(b))
@@ -103,26 +101,15 @@ constexpr int kBytes = 64;
 #undef FORGESCAN_GATHER
 }  // namespace avx512
 FORGESCAN_END_TARGET
-#endif
 
 namespace baseline {
 constexpr int kBytes = 16;
 #define FORGESCAN_WIDEN(bytes) __builtin_convertvector(*reinterpret_cast<const Bytes*>(bytes), V)
 #define FORGESCAN_GATHER(table, index) \
   Wide { (I32) table[index[0]], (I32)table[index[1]], (I32)table[index[2]], (I32)table[index[3]] }
-#if defined(__x86_64__)
 #define FORGESCAN_HIGH(a, b) (V) _mm_mulhi_epu16((__m128i)(a), (__m128i)(b))
 #define FORGESCAN_EXCESS(a, b) (V) _mm_subs_epu16((__m128i)(a), (__m128i)(b))
 #define FORGESCAN_PAIR_SUMS(a, b) (Wide) _mm_madd_epi16((__m128i)(a), (__m128i)(b))
-#else
-using Products [[gnu::vector_size(32)]] = U32;
-#define FORGESCAN_HIGH(a, b) \
-  __builtin_convertvector(   \
-      (__builtin_convertvector(a, Products) * __builtin_convertvector(b, Products)) >> 16, V)
-#define FORGESCAN_EXCESS(a, b) (Greater(a, b) - (b))
-#define FORGESCAN_PAIR_SUMS(a, b) \
-  ((Wide)(a) << 16 >> 16) * ((Wide)(b) << 16 >> 16) + ((Wide)(a) >> 16) * ((Wide)(b) >> 16)
-#endif
 #include "services/reconstruction/packed_kernel_loops.inc"
 #undef FORGESCAN_HIGH
 #undef FORGESCAN_EXCESS
@@ -133,12 +120,9 @@ using Products [[gnu::vector_size(32)]] = U32;
 
 }  // namespace
 
-PackedKernel::PackedKernel(SimdPath path) : run_(&baseline::DecodeStrip) {
-#if defined(__x86_64__)
-  run_ = path == SimdPath::kAvx512 ? &avx512::DecodeStrip
-         : path == SimdPath::kAvx2 ? &avx2::DecodeStrip
-                                   : run_;
-#endif
-}
+PackedKernel::PackedKernel(SimdPath path)
+    : run_(path == SimdPath::kAvx512 ? &avx512::DecodeStrip
+           : path == SimdPath::kAvx2 ? &avx2::DecodeStrip
+                                     : &baseline::DecodeStrip) {}
 
 }  // namespace forgescan

@@ -19,7 +19,7 @@ struct PackedLimit {
 // Eq. (4) of the paper as whole numbers: 2 A = I11 + I13, 2 C1 = I11 - I13, 2 S1 = 2 A - 2 I12, 2 Cj = 2 Ij1
 // - 2 A, 2 Sj = 2 A - 2 Ij2. Slot 0 is the frequency with three frames. Units: a phase is 2^-16 turn, a
 // modulation or contrast 1/64 DN. A phase is within 1.5e-4 rad of the exact one, a hundredth of the noise of
-// good light; a modulation within 1/5000 and 1/32 DN.
+// good light; a modulation within 1/1500 and 1/32 DN.
 struct PackedConstants {
   std::array<std::size_t, 3> slot{};  // of the finest frequency and of the other two
   std::size_t first_slot = 0;         // of the pattern's first frequency, which ratios and reference refer to
@@ -69,8 +69,8 @@ struct PackedConstants {
 struct PackedStrip {
   std::array<const std::uint8_t*, 8> frames{};  // I11 I12 I13 I21 I22 I31 I32 and the reference, or nothing
   int length = 0;                               // px: a multiple of 32, at most kMaxLength
-  float* coordinate_px = nullptr;
-  std::uint16_t* variance_px2 = nullptr;  // upper half of a float
+  float* coordinate_px = nullptr;  // NaN where masked, but for pixels of doubtful fringe order
+  std::uint16_t* variance_px2 = nullptr;  // upper half of a float; null: not wanted
   std::uint8_t* cause = nullptr;
 
   // The rest of it from a pixel on.
@@ -81,7 +81,7 @@ struct PackedStrip {
     }
     rest.length -= begin;
     rest.coordinate_px += begin;
-    rest.variance_px2 += begin;
+    rest.variance_px2 = variance_px2 == nullptr ? nullptr : variance_px2 + begin;
     rest.cause += begin;
     return rest;
   }

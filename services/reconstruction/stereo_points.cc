@@ -19,11 +19,10 @@ double TypicalSlope(const DecodedView& view) {
   HistogramMedian slopes(-kMaxSlope, kMaxSlope, 1 << 15);
   const int step = std::max(view.cause.rows / kRows, 1);
   for (int row = step / 2; row < view.cause.rows; row += step) {
-    const std::uint8_t* const cause = view.cause[row];
     const float* const coordinate = view.coordinate_px[row];
     for (int x = 0; x + 1 < view.cause.cols; ++x) {
       const double slope = static_cast<double>(coordinate[x + 1] - coordinate[x]);
-      if (cause[x] == 0 && cause[x + 1] == 0 && std::isfinite(slope)) {
+      if (std::isfinite(slope)) {
         slopes.Add(slope);
       }
     }
@@ -53,7 +52,8 @@ Status CheckSlopes(double left, double right) {
 
 Status CheckSize(const DecodedView& view, const StereoRig& rig) {
   const cv::Size size(rig.size().width_px, rig.size().height_px);
-  if (view.cause.size() != size || view.coordinate_px.size() != size || view.variance_px2.size() != size) {
+  const cv::Size half(size.width, (size.height + 1) / 2);
+  if (view.cause.size() != size || view.coordinate_px.size() != size || view.variance_px2.size() != half) {
     return Fail(ErrorCode::kInvalidArgument, "the views have {} x {} px, prepared were {} x {}",
                 view.cause.cols, view.cause.rows, size.width, size.height);
   }
@@ -63,10 +63,8 @@ Status CheckSize(const DecodedView& view, const StereoRig& rig) {
 RawView ViewOf(const DecodedView& view, double slope, const ReconstructionConfig& config) {
   return {.coordinate_px = view.coordinate_px[0],
           .variance_px2 = view.variance_px2[0],
-          .cause = view.cause[0],
           .coordinate_stride = static_cast<std::ptrdiff_t>(view.coordinate_px.step1()),
           .variance_stride = static_cast<std::ptrdiff_t>(view.variance_px2.step1()),
-          .cause_stride = static_cast<std::ptrdiff_t>(view.cause.step1()),
           .width = view.cause.cols,
           .height = view.cause.rows,
           .max_step_px = static_cast<float>(config.max_slope_ratio * std::abs(slope)),

@@ -87,7 +87,7 @@ class Strip {
     const auto& config = task_.config;
     const double angle = config.max_view_angle_deg * std::numbers::pi / 180;
     const StereoRig& rig = task_.rig;
-    return {.focal_px = static_cast<float>(rig.focal_px),
+    return {.inverse_focal = static_cast<float>(1 / rig.focal_px),
             .focal_times_baseline = static_cast<float>(rig.focal_px * rig.baseline_mm),
             .row_px = static_cast<float>(row - rig.center_y_px),
             .min_depth_mm = static_cast<float>(config.min_depth_mm),
@@ -99,12 +99,20 @@ class Strip {
             .projector = projector_ ? &*projector_ : nullptr};
   }
 
+  static PointArray ArrayFor(float* values, float* target) {
+    constexpr std::uintptr_t kLine = 64;
+    const std::uintptr_t past = reinterpret_cast<std::uintptr_t>(target) % kLine;
+    return {values, target, static_cast<std::ptrdiff_t>((kLine - past) % kLine / sizeof(float))};
+  }
+
   PointRow EmptyRow() {
     const std::size_t room = points_.size() / kPointFloats;
     float* const at = points_.data();
-    return {.points_mm = at,
-            .normals = at + 3 * room,
-            .sigma_mm = at + 6 * room,
+    const int step = task_.config.keep_every_nth_point;
+    const PointTargets to = step == 1 ? cloud_.Room(room) : PointTargets{};
+    return {.points_mm = ArrayFor(at, to.points_mm),
+            .normals = ArrayFor(at + 3 * room, to.normals),
+            .sigma_mm = ArrayFor(at + 6 * room, to.sigma_mm),
             .coordinate_px = at + 7 * room,
             .residual_px = at + 8 * room,
             .count = 0,
@@ -142,15 +150,27 @@ class Strip {
     Append(row, points);
   }
 
+  // What was not streamed.
+  static void CopyEnds(std::ptrdiff_t count, const PointArray& array) {
+    const PointArray fresh = ArrayFor(array.values, array.target);
+    std::copy_n(array.values, std::min(count, fresh.streamed), array.target);
+    if (array.streamed < count) {
+      std::copy(array.values + array.streamed, array.values + count, array.target + array.streamed);
+    }
+  }
+
   void Append(int row, const PointRow& points) {
-    const auto* const p = reinterpret_cast<const Eigen::Vector3f*>(points.points_mm);
-    const auto* const n = reinterpret_cast<const Eigen::Vector3f*>(points.normals);
+    const auto* const p = reinterpret_cast<const Eigen::Vector3f*>(points.points_mm.values);
+    const auto* const n = reinterpret_cast<const Eigen::Vector3f*>(points.normals.values);
     const auto count = static_cast<std::size_t>(points.count);
-    const PointSpans spans = {{p, count}, {n, count}, {points.sigma_mm, count}};
     const int step = task_.config.keep_every_nth_point;
     if (step == 1) {
-      cloud_.Append(spans);
+      CopyEnds(3 * points.count, points.points_mm);
+      CopyEnds(3 * points.count, points.normals);
+      CopyEnds(points.count, points.sigma_mm);
+      cloud_.Added(count);
     } else {
+      const PointSpans spans = {{p, count}, {n, count}, {points.sigma_mm.values, count}};
       cloud_.AppendThinned(spans, static_cast<std::size_t>(5 * row % step), static_cast<std::size_t>(step));
     }
     for (int i = 37 * row % task_.sample_step; i < points.count; i += task_.sample_step) {

@@ -2,12 +2,28 @@
 
 #include <utility>
 
+#include "services/common/huge_pages.h"
+
 namespace forgescan {
 namespace {
 
 bool IsOurs(const cv::Mat& map) { return map.u != nullptr && map.u->refcount == 1; }
 
+void Create(cv::Size size, cv::Mat& map, int type) {
+  const std::uint8_t* const before = map.data;
+  map.create(size, type);
+  if (map.data != before) {
+    AdviseHuge(map.data, map.total() * map.elemSize());
+  }
+}
+
 }  // namespace
+
+void CreateMaps(cv::Size size, DecodedView& view) {
+  Create(size, view.coordinate_px, CV_32F);
+  Create({size.width, (size.height + 1) / 2}, view.variance_px2, CV_16U);
+  Create(size, view.cause, CV_8U);
+}
 
 void ViewPool::Give(DecodedView view) {
   constexpr std::size_t kMaxViews = 2;
@@ -29,9 +45,7 @@ DecodedView ViewPool::Take(cv::Size size) {
       views_.pop_back();
     }
   }
-  view.coordinate_px.create(size);
-  view.variance_px2.create(size);
-  view.cause.create(size);
+  CreateMaps(size, view);
   return view;
 }
 

@@ -68,7 +68,7 @@ double SquaresOverPredicted(const DecodedView& view) {
       if (view.cause(y, x) != static_cast<std::uint8_t>(MaskCause::kValid)) continue;
       const double off = static_cast<double>(view.coordinate_px(y, x)) - c.scene.columns(y, x);
       if (std::abs(off) > c.pattern.frequencies[1].period_px / 2) continue;
-      squares += off * off / static_cast<double>(FloatFromUpper(view.variance_px2(y, x)));
+      squares += off * off / static_cast<double>(view.VariancePx2(y, x));
     }
   }
   return squares;

@@ -24,10 +24,9 @@ struct EpipolarBlock {
 
 // Raw images; strides in elements.
 struct RawView {
-  const float* coordinate_px;
-  const std::uint16_t* variance_px2;  // upper halves of floats
-  const std::uint8_t* cause;          // 0: valid
-  std::ptrdiff_t coordinate_stride, variance_stride, cause_stride;
+  const float* coordinate_px;         // NaN: masked
+  const std::uint16_t* variance_px2;  // upper halves of floats, of even rows only
+  std::ptrdiff_t coordinate_stride, variance_stride;
   int width, height;
   float max_step_px;  // largest difference of two neighbours on one surface
   float sign;         // makes coordinates ascend along a row
@@ -105,7 +104,7 @@ struct ProjectorModel {
 };
 
 struct PointGeometry {
-  float focal_px, focal_times_baseline, row_px;  // row_px: rectified, from the principal point
+  float inverse_focal, focal_times_baseline, row_px;  // 1/px, px mm, px; the row from the principal point
   float min_depth_mm, max_depth_mm;
   float squared_min_cosine, max_slope_per_disparity;
   int radius_px;
@@ -113,11 +112,20 @@ struct PointGeometry {
   const ProjectorModel* projector;  // null: none
 };
 
-// A row's points, one behind the other; room for all pixels and 16 more.
+// One of a row's results, one behind the other, and where they are to be in the end: whole cache lines, 16 floats,
+// go there past the cache as soon as they are full. What lies before the target's first line and behind what is
+// streamed is left to the caller. target: null, nowhere.
+struct PointArray {
+  float* values;
+  float* target;
+  std::ptrdiff_t streamed;  // values up to here, counted from the first one; at first those before the line
+};
+
+// A row's points; room for all pixels and 16 more.
 struct PointRow {
-  float* points_mm;  // x y z
-  float* normals;    // x y z
-  float* sigma_mm;
+  PointArray points_mm;  // x y z
+  PointArray normals;    // x y z
+  PointArray sigma_mm;
   float* coordinate_px;
   float* residual_px;  // shown column minus the projector's, of residual_count points, those included that go
                        // for it

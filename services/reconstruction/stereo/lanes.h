@@ -21,12 +21,6 @@ FORGESCAN_INLINE Floats Load(const float* at) {
   __builtin_memcpy(&value, at, sizeof(value));
   return value;
 }
-// Floats of which only the upper halves are stored.
-FORGESCAN_INLINE Floats LoadUpper(const std::uint16_t* at) {
-  std::uint16_t __attribute__((vector_size(32))) upper;
-  __builtin_memcpy(&upper, at, sizeof(upper));
-  return (Floats)(__builtin_convertvector(upper, Ints) << 16);
-}
 // At any address. Not by memcpy, after which the compiler takes every pointer and number in memory for
 // changed. A typedef, because clang overlooks the alignment in `using`.
 typedef float LooseFloats __attribute__((vector_size(64), aligned(4)));
@@ -37,16 +31,6 @@ FORGESCAN_INLINE Floats Magnitude(Floats value) { return (Floats)((Ints)value & 
 // Towards zero; |value| < 2^31.
 FORGESCAN_INLINE Floats Truncated(Floats value) {
   return __builtin_convertvector(__builtin_convertvector(value, Ints), Floats);
-}
-// 1 / sqrt(value) of a positive, normal number, to about 2e-7 of it: a first guess from the bits, then three
-// steps of Newton's method. Unlike the instruction for it, the same on every processor.
-FORGESCAN_INLINE Floats InverseSqrt(Floats value) {
-  Floats y = (Floats)(0x5f3759df - ((Ints)value >> 1));
-  const Floats half = 0.5F * value;
-  for (int i = 0; i < 3; ++i) {
-    y = y * (1.5F - half * y * y);
-  }
-  return y;
 }
 
 #ifdef __AVX512F__
@@ -68,11 +52,24 @@ FORGESCAN_INLINE Ints CountUp(Ints count, Mask mask) {
 FORGESCAN_INLINE Mask Above(Ints a, int limit) {
   return {_mm512_cmpgt_epi32_mask((__m512i)a, _mm512_set1_epi32(limit))};
 }
+// Whether low <= value <= high, with low > 0; not of NaN. Numbers above 0 are in the order of their bits.
+FORGESCAN_INLINE Mask IsWithin(Floats value, float low, float high) {
+  const __m512i first = (__m512i)All(low), span = _mm512_sub_epi32((__m512i)All(high), first);
+  return {_mm512_cmple_epu32_mask(_mm512_sub_epi32((__m512i)value, first), span)};
+}
+// Floats of which only the upper halves are stored.
+FORGESCAN_INLINE Floats SelectUpper(Mask mask, const std::uint16_t* yes, const std::uint16_t* no) {
+  const __m256i upper = _mm256_mask_loadu_epi16(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(no)),
+                                                mask.bits, yes);
+  return (Floats)_mm512_slli_epi32(_mm512_cvtepu16_epi32(upper), 16);
+}
 FORGESCAN_INLINE Floats Sqrt(Floats value) { return _mm512_sqrt_ps(value); }
+// To the beginning of a cache line, past the cache.
+FORGESCAN_INLINE void StoreLine(float* line, Floats value) { _mm512_stream_ps(line, value); }
 // Lanes kFirst, kFirst + 1, ... of the 32 that low and high are.
 template <int kFirst>
 FORGESCAN_INLINE Floats Shifted(Floats low, Floats high) {
-  return (Floats)_mm512_alignr_epi32((__m512i)high, (__m512i)low, kFirst);
+  return (Floats)_mm512_maskz_alignr_epi32(0xffff, (__m512i)high, (__m512i)low, kFirst);
 }
 // from[index] for 0 <= index < 32; other lanes are anything.
 class NearTable {
@@ -88,24 +85,19 @@ class NearTable {
 FORGESCAN_INLINE Floats LookUp(const float* from, Ints index) {
   return _mm512_mask_i32gather_ps(Floats{}, 0xffff, (__m512i)index, from, 4);
 }
-// The chosen lanes one behind the other; writes all 16.
-FORGESCAN_INLINE void StorePacked(float* at, Mask mask, Floats value) {
-  Store(at, _mm512_maskz_compress_ps(mask.bits, value));
-}
-// x, y, z of the chosen lanes one behind the other; writes all 48.
-FORGESCAN_INLINE void StorePacked(float* at, Mask mask, Floats x, Floats y, Floats z) {
+// The chosen lanes, one behind the other; then anything.
+FORGESCAN_INLINE Floats Packed(Mask mask, Floats value) { return _mm512_maskz_compress_ps(mask.bits, value); }
+// x, y, z of lane after lane.
+FORGESCAN_INLINE void StoreTriples(float* at, Floats x, Floats y, Floats z) {
   alignas(64) static constexpr int kXy[3][16] = {{0, 16, 0, 1, 17, 0, 2, 18, 0, 3, 19, 0, 4, 20, 0, 5},
                                                  {21, 0, 6, 22, 0, 7, 23, 0, 8, 24, 0, 9, 25, 0, 10, 26},
                                                  {0, 11, 27, 0, 12, 28, 0, 13, 29, 0, 14, 30, 0, 15, 31, 0}};
   alignas(64) static constexpr int kZ[3][16] = {{0, 1, 16, 3, 4, 17, 6, 7, 18, 9, 10, 19, 12, 13, 20, 15},
                                                 {0, 21, 2, 3, 22, 5, 6, 23, 8, 9, 24, 11, 12, 25, 14, 15},
                                                 {26, 1, 2, 27, 4, 5, 28, 7, 8, 29, 10, 11, 30, 13, 14, 31}};
-  const Floats px = _mm512_maskz_compress_ps(mask.bits, x);
-  const Floats py = _mm512_maskz_compress_ps(mask.bits, y);
-  const Floats pz = _mm512_maskz_compress_ps(mask.bits, z);
   for (int i = 0; i < 3; ++i) {
-    const Floats xy = _mm512_permutex2var_ps(px, _mm512_load_si512(kXy[i]), py);
-    Store(at + i * kLanes, _mm512_permutex2var_ps(xy, _mm512_load_si512(kZ[i]), pz));
+    const Floats xy = _mm512_permutex2var_ps(x, _mm512_load_si512(kXy[i]), y);
+    Store(at + i * kLanes, _mm512_permutex2var_ps(xy, _mm512_load_si512(kZ[i]), z));
   }
 }
 
@@ -133,8 +125,26 @@ FORGESCAN_INLINE Mask Equal(Floats a, Floats b) { return {a == b}; }
 FORGESCAN_INLINE Floats Select(Mask mask, Floats yes, Floats no) {
   return (Floats)(((Ints)yes & mask.lanes) | ((Ints)no & ~mask.lanes));
 }
+FORGESCAN_INLINE Mask IsWithin(Floats value, float low, float high) {
+  return {(All(low) <= value) & (value <= All(high))};
+}
+FORGESCAN_INLINE Floats LoadUpper(const std::uint16_t* at) {
+  std::uint16_t __attribute__((vector_size(32))) upper;
+  __builtin_memcpy(&upper, at, sizeof(upper));
+  return (Floats)(__builtin_convertvector(upper, Ints) << 16);
+}
+FORGESCAN_INLINE Floats SelectUpper(Mask mask, const std::uint16_t* yes, const std::uint16_t* no) {
+  return Select(mask, LoadUpper(yes), LoadUpper(no));
+}
 FORGESCAN_INLINE Ints CountUp(Ints count, Mask mask) { return count - mask.lanes; }
 FORGESCAN_INLINE Mask Above(Ints a, int limit) { return {a > limit}; }
+FORGESCAN_INLINE void StoreLine(float* line, Floats value) {
+  for (int i = 0; i < 4; ++i) {
+    __m128 four;
+    __builtin_memcpy(&four, reinterpret_cast<const char*>(&value) + 16 * i, sizeof(four));
+    _mm_stream_ps(line + 4 * i, four);
+  }
+}
 FORGESCAN_INLINE Floats Sqrt(Floats value) {
   for (int i = 0; i < 4; ++i) {
     __m128 four;
@@ -166,20 +176,21 @@ class NearTable {
  private:
   const float* from_;
 };
-FORGESCAN_INLINE void StorePacked(float* at, Mask mask, Floats value) {
+FORGESCAN_INLINE Floats Packed(Mask mask, Floats value) {
+  float packed[kLanes + 1] = {};
   const unsigned bits = Bits(mask);
+  int count = 0;
   for (int i = 0; i < kLanes; ++i) {
-    *at = value[i];
-    at += bits >> i & 1;
+    packed[count] = value[i];
+    count += static_cast<int>(bits >> i & 1);
   }
+  return Load(packed);
 }
-FORGESCAN_INLINE void StorePacked(float* at, Mask mask, Floats x, Floats y, Floats z) {
-  const unsigned bits = Bits(mask);
+FORGESCAN_INLINE void StoreTriples(float* at, Floats x, Floats y, Floats z) {
   for (int i = 0; i < kLanes; ++i) {
-    at[0] = x[i];
-    at[1] = y[i];
-    at[2] = z[i];
-    at += 3 * (bits >> i & 1);
+    at[3 * i] = x[i];
+    at[3 * i + 1] = y[i];
+    at[3 * i + 2] = z[i];
   }
 }
 
@@ -210,16 +221,6 @@ FORGESCAN_INLINE Mask operator|(Mask a, Mask b) {
 FORGESCAN_INLINE bool Any(Mask mask) { return Bits(mask) != 0; }
 FORGESCAN_INLINE long Count(Mask mask) { return __builtin_popcount(Bits(mask)); }
 FORGESCAN_INLINE Mask IsNumber(Floats value) { return Equal(value, value); }
-// The lanes whose two bytes are both 0.
-FORGESCAN_INLINE Mask BothZero(const std::uint8_t* a, const std::uint8_t* b) {
-  const __m128i either = _mm_or_si128(_mm_loadu_si128(reinterpret_cast<const __m128i*>(a)),
-                                      _mm_loadu_si128(reinterpret_cast<const __m128i*>(b)));
-#ifdef __AVX512F__
-  return {_mm_testn_epi8_mask(either, either)};
-#else
-  return FromBits(static_cast<unsigned>(_mm_movemask_epi8(_mm_cmpeq_epi8(either, _mm_setzero_si128()))));
-#endif
-}
 
 }  // namespace
 }  // namespace forgescan

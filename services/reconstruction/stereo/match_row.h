@@ -102,7 +102,9 @@ FORGESCAN_INLINE Match FindInSegment(Floats wanted, Mask inside, const StereoRow
   const NearTable ranks(from.rank);
   Ints index;
   __builtin_memcpy(&index, hint.index, sizeof(index));
-  for (int i = 0; i < kTries; ++i) {
+  // Some lane nearly always has to move by one, which no processor can foretell: without a branch.
+  index = CountUp(index, LessEqual(ranks[index + 1], wanted)) - CountUp(Ints{}, Less(wanted, ranks[index]));
+  for (int i = 1; i < kTries; ++i) {
     const Floats rank = ranks[index], next_rank = ranks[index + 1];
     const Mask above = inside & LessEqual(next_rank, wanted), below = inside & Less(wanted, rank);
     if (!Any(above | below)) {
@@ -208,7 +210,12 @@ FORGESCAN_INLINE Mask Closes(int x, const StereoRow& left, const Match& match, c
          LessEqual(gap, limits.max_left_right_px * left_step * right_step * match.inverse_step);
 }
 
-FORGESCAN_INLINE MatchCounts MatchBlock(const MatchTask& task, int block, const DisparityRow& disparity) {
+// Bits of a block's pixels; each set is part of the one before.
+struct Outcome {
+  unsigned valid, found, once, good;
+};
+
+FORGESCAN_INLINE Outcome MatchBlock(const MatchTask& task, int block, const DisparityRow& disparity) {
   const StereoRow& left = *task.left;
   const int x = block * kLanes;
   const Floats wanted = Load(left.coordinate_px + x);
@@ -231,23 +238,20 @@ FORGESCAN_INLINE MatchCounts MatchBlock(const MatchTask& task, int block, const 
       px_per_coordinate * px_per_coordinate * (Load(left.variance_px2 + x) + right_variance);
   Store(disparity.disparity_px + x, Select(good, Load(left.column_px + x) - partner, none));
   Store(disparity.variance_px2 + x, variance);
-  return {.candidates = Count(valid),
-          .no_partner = Count(Without(valid, match.found)),
-          .ambiguous = Count(match.found & search.twice),
-          .left_right = Count(Without(once, good))};
+  return {Bits(valid), Bits(match.found), Bits(once), Bits(good)};
 }
 
 inline MatchCounts MatchRow(const MatchTask& task, const DisparityRow& disparity) {
-  MatchCounts sum;
+  long valid = 0, found = 0, once = 0, good = 0;
   for (int block = 0; block < task.blocks; ++block) {
     FetchAhead(task.next, block);
-    const MatchCounts counts = MatchBlock(task, block, disparity);
-    sum.candidates += counts.candidates;
-    sum.no_partner += counts.no_partner;
-    sum.ambiguous += counts.ambiguous;
-    sum.left_right += counts.left_right;
+    const Outcome outcome = MatchBlock(task, block, disparity);
+    valid += __builtin_popcount(outcome.valid);
+    found += __builtin_popcount(outcome.found);
+    once += __builtin_popcount(outcome.once);
+    good += __builtin_popcount(outcome.good);
   }
-  return sum;
+  return {.candidates = valid, .no_partner = valid - found, .ambiguous = found - once, .left_right = once - good};
 }
 
 }  // namespace

@@ -10,17 +10,11 @@ namespace forgescan {
 namespace {
 
 // Sums over the columns of the window, and their moments about its middle row; NaN where a pixel is missing.
-// Only where a window of the middle row can reach.
 FORGESCAN_INLINE void SumColumns(const PointTask& task, int x, int radius) {
-  const float* const middle = task.rows[radius] + x;
-  const Floats here = Load(middle);
-  if (!Any(IsNumber(here) | IsNumber(Load(middle - kLanes)) | IsNumber(Load(middle + kLanes)))) {
-    return;
-  }
-  Floats sum = here;
-  Floats moment = {};
-  for (int k = 1; k <= radius; ++k) {
-    const Floats above = Load(task.rows[radius - k] + x), below = Load(task.rows[radius + k] + x);
+  Floats above = Load(task.rows[radius - 1] + x), below = Load(task.rows[radius + 1] + x);
+  Floats sum = Load(task.rows[radius] + x) + (above + below), moment = below - above;
+  for (int k = 2; k <= radius; ++k) {
+    above = Load(task.rows[radius - k] + x), below = Load(task.rows[radius + k] + x);
     sum += above + below;
     moment += static_cast<float>(k) * (below - above);
   }
@@ -35,9 +29,10 @@ struct Gradient {
 
 // Least squares over a window without a missing pixel; known: whether it is that.
 FORGESCAN_INLINE Gradient FullGradient(const PointTask& task, int x, int radius) {
-  Floats along = {}, across = Load(task.moments + x);
-  float weight = 0;
-  for (int k = 1; k <= radius; ++k) {
+  Floats along = Load(task.sums + x + 1) - Load(task.sums + x - 1);
+  Floats across = Load(task.moments + x) + (Load(task.moments + x + 1) + Load(task.moments + x - 1));
+  float weight = 2;
+  for (int k = 2; k <= radius; ++k) {
     along += static_cast<float>(k) * (Load(task.sums + x + k) - Load(task.sums + x - k));
     across += Load(task.moments + x + k) + Load(task.moments + x - k);
     weight += static_cast<float>(2 * k * k);
@@ -125,16 +120,15 @@ struct SurfacePoint {
 // d / f. All of it is multiplied by the slope of the columns, which saves a division.
 FORGESCAN_INLINE SurfacePoint PointOf(Floats column, Floats disparity, Floats depth, const Gradient& gradient,
                                       const ColumnSlopes& slopes, const PointGeometry& geometry) {
-  const float inverse_focal = 1 / geometry.focal_px;
-  const Floats x = column * inverse_focal;
-  const float y = geometry.row_px * inverse_focal;
-  const Floats along_ray = disparity * inverse_focal * slopes.along;
+  const Floats x = column * geometry.inverse_focal;
+  const float y = geometry.row_px * geometry.inverse_focal;
+  const Floats along_ray = disparity * geometry.inverse_focal * slopes.along;
   const Floats gx = gradient.x;
   const Floats gy = gradient.y * slopes.along - gradient.x * slopes.across;
   const Floats gz = along_ray - gx * x - gy * y;
   const Floats square = gx * gx + gy * gy + gz * gz;
   const Floats ray_square = x * x + (y * y + 1);
-  const Floats length = Select(Less(Floats{}, along_ray), -InverseSqrt(square), InverseSqrt(square));
+  const Floats length = Select(Less(Floats{}, along_ray), All(-1), All(1)) / Sqrt(square);
   return {.x = depth * x,
           .y = depth * y,
           .z = depth,
@@ -154,7 +148,7 @@ inline __attribute__((noinline)) Mask CheckWithProjector(const PointTask& task, 
   const ProjectorModel& model = *geometry.projector;
   const Floats shown = geometry.sign * Load(task.left->coordinate_px + x);
   const Floats residual = shown - ProjectorColumn(model, point.x, point.y, point.z);
-  StorePacked(points.residual_px + points.residual_count, point.good, residual);
+  Store(points.residual_px + points.residual_count, Packed(point.good, residual));
   points.residual_count += static_cast<int>(Count(point.good));
   const Floats variance = Load(task.left->variance_px2 + x);
   const Floats square = residual * residual;
@@ -164,15 +158,28 @@ inline __attribute__((noinline)) Mask CheckWithProjector(const PointTask& task, 
   return point.good & lit;
 }
 
+// Those that are good, one behind the other.
+FORGESCAN_INLINE void AddPoints(Mask good, SurfacePoint point, Floats sigma, Floats coordinate, PointRow& points) {
+  if (Bits(good) != 0xffff) {  // nearly all blocks are full
+    for (Floats* const value :
+         {&point.x, &point.y, &point.z, &point.nx, &point.ny, &point.nz, &sigma, &coordinate}) {
+      *value = Packed(good, *value);
+    }
+  }
+  const int at = points.count;
+  StoreTriples(points.points_mm.values + 3 * at, point.x, point.y, point.z);
+  StoreTriples(points.normals.values + 3 * at, point.nx, point.ny, point.nz);
+  Store(points.sigma_mm.values + at, sigma);
+  Store(points.coordinate_px + at, coordinate);
+  points.count += static_cast<int>(Count(good));
+}
+
 FORGESCAN_INLINE void PointBlock(const PointTask& task, int block, int radius, const PointGeometry& geometry,
                                  PointRow& points) {
   const int x = block * kLanes;
   const Floats disparity = Load(task.rows[radius] + x);
   const Mask matched = IsNumber(disparity);
-  if (!Any(matched)) {
-    return;
-  }
-  const Floats depth = geometry.focal_times_baseline / disparity;
+  const Floats inverse_disparity = 1 / disparity, depth = geometry.focal_times_baseline * inverse_disparity;
   const Mask in_range =
       matched & LessEqual(All(geometry.min_depth_mm), depth) & LessEqual(depth, All(geometry.max_depth_mm));
   const Gradient gradient = GradientAt(task, x, in_range, radius, geometry);
@@ -180,32 +187,57 @@ FORGESCAN_INLINE void PointBlock(const PointTask& task, int block, int radius, c
   SurfacePoint point =
       PointOf(Load(task.left->column_px + x), disparity, depth, gradient, SlopesAt(task, block), geometry);
   point.good = Without(has_normal, point.is_steep | IsOnStep(task.rows + radius, x, disparity, geometry));
-  const Mask good =
-      geometry.projector != nullptr ? CheckWithProjector(task, x, point, geometry, points) : point.good;
+  Mask good = point.good;
+  if (geometry.projector != nullptr) {
+    const SurfacePoint passed = point;  // so that the point itself never has to be in memory
+    good = CheckWithProjector(task, x, passed, geometry, points);
+  }
   const Floats variance = Load(task.disparity->variance_px2 + x);
-  const Floats sigma = Magnitude(depth / disparity) * Sqrt(variance * point.ray_square);
-  const int at = points.count;
-  StorePacked(points.points_mm + 3 * at, good, point.x, point.y, point.z);
-  StorePacked(points.normals + 3 * at, good, point.nx, point.ny, point.nz);
-  StorePacked(points.sigma_mm + at, good, sigma);
-  StorePacked(points.coordinate_px + at, good, Load(task.left->coordinate_px + x));
-  points.count += static_cast<int>(Count(good));
+  const Floats sigma = Magnitude(depth * inverse_disparity) * Sqrt(variance * point.ray_square);
+  AddPoints(good, point, sigma, Load(task.left->coordinate_px + x), points);
   points.depth_range += Count(Without(matched, in_range));
   points.no_normal += Count(Without(in_range, has_normal));
   points.steep += Count(Without(has_normal, point.good));
 }
 
+FORGESCAN_INLINE void StreamArray(std::ptrdiff_t ready, PointArray& array) {
+  for (; array.target != nullptr && array.streamed + kLanes <= ready; array.streamed += kLanes) {
+    StoreLine(array.target + array.streamed, Load(array.values + array.streamed));
+  }
+}
+
+FORGESCAN_INLINE void StreamPoints(std::ptrdiff_t ready, PointRow& points) {
+  StreamArray(3 * ready, points.points_mm);
+  StreamArray(3 * ready, points.normals);
+  StreamArray(ready, points.sigma_mm);
+}
+
 FORGESCAN_INLINE void PointBlocks(const PointTask& task, int radius, const PointGeometry& geometry,
                                   PointRow& points) {
   constexpr int kAhead = 2;  // blocks: what was stored a moment ago cannot be read again at once
-  for (int block = 0; block < kAhead; ++block) {
-    SumColumns(task, block * kLanes, radius);
+  const auto matched = [&](int block) -> std::uint64_t {
+    return Bits(IsNumber(Load(task.rows[radius] + block * kLanes)));
+  };
+  constexpr int kStreamed = 1;  // blocks: what is streamed was stored so many blocks ago, or twice as many
+  int ready = 0;
+  std::uint64_t window = matched(0) << 48;  // of this block, from bit 0, and the next three
+  for (int block = -kAhead; block < task.blocks; ++block) {
+    window = window >> 16 | matched(block + kAhead + 1) << 48;
+    if (window >> 16 != 0) {  // a window of the middle row can reach these columns
+      SumColumns(task, (block + kAhead) * kLanes, radius);
+    }
+    if (block >= 0) {
+      FetchAhead(task.next, block);
+    }
+    if ((window & 0xffff) != 0) {
+      PointBlock(task, block, radius, geometry, points);
+    }
+    if (block % kStreamed == 0) {
+      StreamPoints(ready, points);
+      ready = points.count;
+    }
   }
-  for (int block = 0; block < task.blocks; ++block) {
-    FetchAhead(task.next, block);
-    SumColumns(task, (block + kAhead) * kLanes, radius);
-    PointBlock(task, block, radius, geometry, points);
-  }
+  StreamPoints(points.count, points);
 }
 
 inline void TriangulateRow(const PointTask& task, const PointGeometry& geometry, PointRow& points) {

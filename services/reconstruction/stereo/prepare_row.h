@@ -9,7 +9,7 @@ namespace {
 
 // Whether two neighbours that differ by this are one surface.
 FORGESCAN_INLINE Mask IsStep(Floats step, const SlopeLimits& limits) {
-  return LessEqual(All(limits.low), step) & LessEqual(step, All(limits.high));
+  return IsWithin(step, limits.low, limits.high);
 }
 
 // The block before, this one and the one behind it, of the raw coordinates.
@@ -21,18 +21,23 @@ struct Smoothed {
   Floats coordinate, variance;
 };
 
+// A bit for each pixel: whether its two right neighbours are one surface.
+FORGESCAN_INLINE unsigned RightSteps(const RawBlocks& raw, const SlopeLimits& limits) {
+  return Bits(IsStep(Shifted<2>(raw.here, raw.behind) - Shifted<1>(raw.here, raw.behind), limits));
+}
+
 // Least squares by a parabola over five pixels of one surface (Savitzky and Golay, Anal. Chem. 36 (1964)
 // 1627): no bias up to the third derivative, 17/35 of the variance. Where one of the five is missing the
 // pixel stays as it is. A pixel that is off its parabola by more than the limit, and by more than 4 sigma,
 // belongs to no surface.
-FORGESCAN_INLINE Smoothed SmoothBlock(int x, const RawBlocks& raw, const SlopeLimits& limits,
+// steps: of this block in its upper half and of the one before, as by RightSteps.
+FORGESCAN_INLINE Smoothed SmoothBlock(int x, const RawBlocks& raw, unsigned steps, const SlopeLimits& limits,
                                       const StereoRow& row) {
   const Floats center = raw.here;
   const Floats left = Shifted<kLanes - 1>(raw.before, raw.here), right = Shifted<1>(raw.here, raw.behind);
   const Floats far_left = Shifted<kLanes - 2>(raw.before, raw.here);
   const Floats far_right = Shifted<2>(raw.here, raw.behind);
-  const Mask smooth = IsStep(left - far_left, limits) & IsStep(center - left, limits) &
-                      IsStep(right - center, limits) & IsStep(far_right - right, limits);
+  const Mask smooth = FromBits((steps >> 16) & (steps >> 15) & (steps >> 14) & (steps >> 13));
   const Floats near_bend = (left - center) + (right - center);
   const Floats far_bend = (far_left - center) + (far_right - center);
   const Floats change = 12.0F / 35 * near_bend - 3.0F / 35 * far_bend;
@@ -128,9 +133,11 @@ inline void PrepareRow(int blocks, const SlopeLimits& limits, StereoRow& row) {
   Smoothed here = {none, none};
   Segmenter segmenter(row);
   unsigned before = 0;
+  unsigned steps = RightSteps(raw, limits) << 16;
   for (int x = 0; x <= blocks * kLanes; x += kLanes) {
     raw = {raw.here, raw.behind, Load(row.raw_px + x + kLanes)};  // NaN behind the row
-    const Smoothed next = x < blocks * kLanes ? SmoothBlock(x, raw, limits, row) : Smoothed{none, none};
+    steps = steps >> 16 | RightSteps(raw, limits) << 16;
+    const Smoothed next = x < blocks * kLanes ? SmoothBlock(x, raw, steps, limits, row) : Smoothed{none, none};
     if (x > 0) {
       const Floats step = Shifted<1>(here.coordinate, next.coordinate) - here.coordinate;
       const unsigned pairs = Bits(IsStep(step, limits)), in_pair = (pairs | pairs << 1 | before) & 0xffff;

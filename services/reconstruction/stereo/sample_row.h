@@ -12,60 +12,58 @@ namespace {
 struct RawEdge {
   float values[2][kLanes];
   std::uint16_t variances[kLanes];
-  std::uint8_t causes[2][kLanes];
 
   RawBlock Copy(const RawBlock& from, int length) {
     for (int i = 0; i < kLanes; ++i) {
-      values[0][i] = i < length ? from.upper[i] : 0;
-      values[1][i] = i < length ? from.lower[i] : 0;
+      values[0][i] = i < length ? from.upper[i] : __builtin_nanf("");
+      values[1][i] = i < length ? from.lower[i] : __builtin_nanf("");
       variances[i] = i < length ? from.variance[i] : std::uint16_t{0};
-      causes[0][i] = i < length ? from.upper_cause[i] : 1;
-      causes[1][i] = i < length ? from.lower_cause[i] : 1;
     }
-    return {values[0], values[1], variances, causes[0], causes[1]};
+    return {values[0], values[1], variances};
   }
 };
 
-// What the line passes between: upper and lower raw values, their variance, and where both are valid.
+// What the line passes between: upper and lower raw values, NaN where masked, and their variance.
 struct RawPair {
   Floats upper, lower, variance;
-  Mask valid;
 };
 
-FORGESCAN_INLINE RawPair PairAt(const RawBlock& raw) {
-  return {Load(raw.upper), Load(raw.lower), LoadUpper(raw.variance),
-          BothZero(raw.upper_cause, raw.lower_cause)};
-}
-
-FORGESCAN_INLINE RawPair Select(Mask mask, const RawPair& yes, const RawPair& no) {
-  return {Select(mask, yes.upper, no.upper), Select(mask, yes.lower, no.lower),
-          Select(mask, yes.variance, no.variance), (yes.valid & mask) | Without(no.valid, mask)};
+// yes in the lanes of the mask, no in the others.
+FORGESCAN_INLINE RawPair PairAt(Mask mask, const RawBlock& yes, const RawBlock& no) {
+  return {Select(mask, Load(yes.upper), Load(no.upper)), Select(mask, Load(yes.lower), Load(no.lower)),
+          SelectUpper(mask, yes.variance, no.variance)};
 }
 
 // whole: raw rows below the block's first.
 inline __attribute__((noinline)) RawPair PairOfMany(const RawView& view, const EpipolarBlock& block, int x,
                                                     Floats whole) {
-  RawPair pair = {};
-  pair.valid = FromBits(0);
+  RawPair pair = {All(__builtin_nanf("")), All(__builtin_nanf("")), Floats{}};
   for (int i = 0; i < block.row_count; ++i) {
     RawEdge edge;
-    const RawBlock raw = BlockAt(view, block.first_row + i, x);
-    const bool is_edge = x + kLanes > view.width;
-    pair = Select(Equal(whole, All(static_cast<float>(i))),
-                  PairAt(is_edge ? edge.Copy(raw, view.width - x) : raw), pair);
+    RawBlock raw = BlockAt(view, block.first_row + i, x);
+    if (x + kLanes > view.width) {
+      raw = edge.Copy(raw, view.width - x);
+    }
+    const Mask here = Equal(whole, All(static_cast<float>(i)));
+    const RawPair one = PairAt(here, raw, raw);
+    pair = {Select(here, one.upper, pair.upper), Select(here, one.lower, pair.lower),
+            Select(here, one.variance, pair.variance)};
   }
   return pair;
 }
 
 // Of at most two rows, which is nearly always enough.
 FORGESCAN_INLINE RawPair PairOfTwo(const RawView& view, const EpipolarBlock& block, int x, Mask in_second) {
-  const RawBlock first = BlockAt(view, block.first_row, x);
-  const RawBlock second = BlockAt(view, block.first_row + block.row_count - 1, x);
-  return Select(in_second, PairAt(second), PairAt(first));
+  return PairAt(in_second, BlockAt(view, block.first_row + block.row_count - 1, x),
+                BlockAt(view, block.first_row, x));
 }
 
-FORGESCAN_INLINE void SampleBlock(const RawView& view, const EpipolarBlock& block, int x,
-                                  const StereoRow& row) {
+// Where a row's samples go.
+struct Sampled {
+  float *raw_px, *variance_px2, *column_px;
+};
+
+FORGESCAN_INLINE void SampleBlock(const RawView& view, const EpipolarBlock& block, int x, const Sampled& row) {
   const Floats lane = LaneNumbers();
   Store(row.column_px + x, block.column[0] + lane * (block.column[1] + lane * block.column[2]));
   if (block.row_count == 0) {
@@ -86,7 +84,7 @@ FORGESCAN_INLINE void SampleBlock(const RawView& view, const EpipolarBlock& bloc
   }
   const Floats part = line - whole;
   const Floats step = raw.lower - raw.upper;
-  const Mask valid = raw.valid & inside & LessEqual(Magnitude(step), All(view.max_step_px));
+  const Mask valid = inside & LessEqual(Magnitude(step), All(view.max_step_px));
   Store(row.raw_px + x, Select(valid, view.sign * (raw.upper + part * step), All(__builtin_nanf(""))));
   // Two independent values of one variance.
   Store(row.variance_px2 + x, raw.variance * (1 - 2 * part * (1 - part)));
@@ -94,10 +92,11 @@ FORGESCAN_INLINE void SampleBlock(const RawView& view, const EpipolarBlock& bloc
 
 inline void SampleRow(const RawView& view, const EpipolarBlock* blocks, const StereoRow& row) {
   const std::ptrdiff_t blocks_a_row = (view.width + kLanes - 1) / kLanes;
-  for (int x = 0; x < view.width; x += kLanes) {
-    const EpipolarBlock& block = blocks[x / kLanes];
-    __builtin_prefetch(&block + blocks_a_row, 0, 3);
-    SampleBlock(view, block, x, row);
+  const RawView raw = view;  // of its own, so that no store can change it
+  const Sampled sampled = {row.raw_px, row.variance_px2, row.column_px};
+  for (int x = 0; x < raw.width; x += kLanes) {
+    __builtin_prefetch(blocks + blocks_a_row, 0, 3);
+    SampleBlock(raw, *blocks++, x, sampled);
   }
 }
 

@@ -1,10 +1,13 @@
 #include "tests/services/reconstruction/decoded_scene.h"
 
+#include <limits>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core/eigen.hpp>
 #include <opencv2/imgproc.hpp>
 #include <random>
 #include <vector>
+
+#include "services/reconstruction/view_pool.h"
 
 namespace forgescan {
 namespace {
@@ -50,6 +53,7 @@ void MaskBorder(DecodedView& view) {
   cv::Mat grown;
   cv::dilate(view.cause != 0, grown, cv::getStructuringElement(cv::MORPH_RECT, {5, 5}));
   view.cause.setTo(static_cast<std::uint8_t>(MaskCause::kBorder), grown & (view.cause == 0));
+  view.coordinate_px.setTo(std::numeric_limits<float>::quiet_NaN(), view.cause != 0);
 }
 
 }  // namespace
@@ -58,10 +62,8 @@ DecodedView SeeDecoded(const DecodedScene& scene, const CameraIntrinsics& lens, 
                        const StereoCalibration& rig, unsigned seed) {
   const ImageSize size = *rig.image_size;
   DecodedView view;
-  view.coordinate_px.create(size.height_px, size.width_px);
-  view.cause.create(size.height_px, size.width_px);
-  view.variance_px2 = cv::Mat_<std::uint16_t>(
-      size.height_px, size.width_px, UpperOfFloat(static_cast<float>(scene.noise_px * scene.noise_px)));
+  CreateMaps({size.width_px, size.height_px}, view);
+  view.variance_px2 = UpperOfFloat(static_cast<float>(scene.noise_px * scene.noise_px));
   std::mt19937 random(seed);
   std::normal_distribution<double> noise(0, 1);
   const Eigen::Vector3d origin = -pose.rotation.transpose() * pose.translation_mm;

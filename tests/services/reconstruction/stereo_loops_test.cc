@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -52,16 +53,15 @@ Row SampleAll(const StereoKernel& kernel, const Lines& lines) {
   std::uniform_real_distribution<float> uniform(0, 1);
   std::vector<float> coordinate(kWidth * kHeight);
   std::vector<std::uint16_t> variance(kWidth * kHeight);
-  std::vector<std::uint8_t> cause(kWidth * kHeight);
   for (std::size_t i = 0; i < coordinate.size(); ++i) {
     coordinate[i] =
         static_cast<float>(i % kWidth) + 0.1F * uniform(random) + (uniform(random) > 0.95F ? 9.0F : 0.0F);
     const float sigma = 0.02F + 0.01F * uniform(random);
     variance[i] = UpperOfFloat(sigma * sigma);
-    cause[i] = uniform(random) > 0.9F ? 3 : 0;
+    coordinate[i] = uniform(random) > 0.9F ? kNan : coordinate[i];
   }
   const RawView view = {
-      coordinate.data(), variance.data(), cause.data(), kWidth, kWidth, kWidth, kWidth, kHeight, 3, -1};
+      coordinate.data(), variance.data(), kWidth, kWidth, kWidth, kHeight, 3, -1};
   Row all;
   for (int row = -2; row < kHeight; ++row) {
     std::vector<EpipolarBlock> blocks(kBlocks);
@@ -133,7 +133,9 @@ Row TriangulateAll(const StereoKernel& kernel, bool with_holes) {
   const DisparityRow disparity = {disparities[4], scratch[3]};
   Row out(9 * kRoom, 0);
   float* const at = out.data();
-  PointRow points = {at, at + 3 * kRoom, at + 6 * kRoom, at + 7 * kRoom, at + 8 * kRoom, 0, 0, 0, 0, 0, 0};
+  alignas(64) std::array<float, 3 * kRoom> target{};
+  PointRow points = {{at, target.data(), 0}, {at + 3 * kRoom, nullptr, 0}, {at + 6 * kRoom, nullptr, 0},
+                     at + 7 * kRoom, at + 8 * kRoom, 0, 0, 0, 0, 0, 0};
   const std::vector<EpipolarBlock> nothing(kBlocks);  // to fetch ahead
   kernel.triangulate({rows.data(),
                       &left.row(),
@@ -145,7 +147,9 @@ Row TriangulateAll(const StereoKernel& kernel, bool with_holes) {
                       scratch[5],
                       kBlocks,
                       {nullptr, nothing.data()}},
-                     {1000, 100000, 5, 50, 10000, 0.117F, 0.003F, 3, 1, nullptr}, points);
+                     {0.001F, 100000, 5, 50, 10000, 0.117F, 0.003F, 3, 1, nullptr}, points);
+  EXPECT_EQ(points.points_mm.streamed, 3 * points.count / 16 * 16);  // whole lines
+  EXPECT_TRUE(std::equal(at, at + points.points_mm.streamed, target.begin())) << kernel.name;
   // Behind the points stands whatever was packed last.
   std::fill(at + 3 * points.count, at + 3 * kRoom, 0.0F);
   std::fill(at + 3 * kRoom + 3 * points.count, at + 6 * kRoom, 0.0F);

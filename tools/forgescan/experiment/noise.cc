@@ -183,7 +183,7 @@ Result<Decoded> Decode(const SetOfFrames& set, double noise_share, std::uint64_t
       ++valid;
       wrong += is_wrong ? 1 : 0;
       squares += is_wrong ? 0 : error_px * error_px;
-      predicted += static_cast<double>(FloatFromUpper(view.variance_px2(y, x)));
+      predicted += static_cast<double>(view.VariancePx2(y, x));
     }
   }
   if (valid == 0) return Fail(ErrorCode::kDegenerate, "no pixel of the ramp was decoded");
