@@ -9,9 +9,9 @@
 
 namespace forgescan {
 
-// Asks for pages of 2 MB, before anything is written: touching 4 kB pages for the first time takes longer than
-// most of what is done with them, and looking them up is felt every time. Advice only: where it is not taken
-// nothing else changes.
+// Asks for pages of 2 MB, before anything is written: touching 4 kB pages for the first time takes longer
+// than most of what is done with them, and looking them up is felt every time. Advice only: where it is not
+// taken nothing else changes.
 inline void AdviseHuge(const void* memory, std::size_t bytes) {
   constexpr std::uintptr_t kHugePage = std::uintptr_t{2} << 20;
   const auto begin = reinterpret_cast<std::uintptr_t>(memory);

@@ -1,5 +1,5 @@
-// Marks functions that are compiled for one instruction set and run only where simd_path.h finds it. GCC has to
-// be told to use the whole width of the vectors; clang does so unasked and does not know the word.
+// Marks functions that are compiled for one instruction set and run only where simd_path.h finds it. GCC has
+// to be told to use the whole width of the vectors; clang does so unasked and does not know the word.
 #pragma once
 
 #if defined(__clang__)

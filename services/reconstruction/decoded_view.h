@@ -44,9 +44,9 @@ inline std::uint16_t UpperOfFloat(float value) {
 // Shape: coordinate_px and cause have the size of the frames. Frames: raw camera pixels.
 struct DecodedView {
   cv::Mat_<float> coordinate_px;  // projector column; NaN where masked
-  // Its predicted variance, projector px^2, by FloatFromUpper: of even rows only, so half as many rows. Fringes
-  // run across the rows, so the row below has nearly the same. Anything where that pixel of the even row is
-  // masked.
+  // Its predicted variance, projector px^2, by FloatFromUpper: of even rows only, so half as many rows.
+  // Fringes run across the rows, so the row below has nearly the same. Anything where that pixel of the even
+  // row is masked.
   cv::Mat_<std::uint16_t> variance_px2;
   cv::Mat_<std::uint8_t> cause;  // MaskCause
   float VariancePx2(int row, int column) const { return FloatFromUpper(variance_px2(row / 2, column)); }

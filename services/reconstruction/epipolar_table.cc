@@ -94,8 +94,9 @@ RowRange RowsInside(int lanes, const Frame& frame, int first, const EpipolarBloc
   return rows;
 }
 
-// The raw rows below which the line runs inside of the frame; its own rows count from the first of them. A line
-// on a raw row may be above it once it counts from that row, in single precision: then from the one before.
+// The raw rows below which the line runs inside of the frame; its own rows count from the first of them. A
+// line on a raw row may be above it once it counts from that row, in single precision: then from the one
+// before.
 void SetRows(int lanes, const Frame& frame, EpipolarBlock& block) {
   const float row = block.row[0];
   int first = 0;

@@ -10,7 +10,8 @@ namespace {
 double TurnsOf(const std::complex<double>& phasor) { return std::arg(phasor) / (2 * std::numbers::pi); }
 
 // Position of a pixel in fringes of the finest frequency, by the table of orders.
-double FringeOf(const FringeOrderTable& table, const std::vector<std::complex<double>>& phasors, double turns) {
+double FringeOf(const FringeOrderTable& table, const std::vector<std::complex<double>>& phasors,
+                double turns) {
   const double begin = turns - std::floor(turns);
   std::array<float, 2> differences{};
   for (std::size_t o = 0; o < static_cast<std::size_t>(table.other_count); ++o) {

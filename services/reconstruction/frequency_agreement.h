@@ -15,11 +15,12 @@ namespace forgescan {
 // quadrature.
 Eigen::MatrixX2d HarmonicFrames(const PatternSet& pattern, const std::vector<std::complex<double>>& phasors);
 
-// Mean square, turn^2 or rad^2, of what the others differ by from the finest frequency, which has these errors.
+// Mean square, turn^2 or rad^2, of what the others differ by from the finest frequency, which has these
+// errors.
 double SquaredDisagreement(const FringeOrderTable& table, const Eigen::VectorXd& errors);
 
-// Rms difference of the other frequencies from the finest one, rad. Its fringe order is that of the coordinate,
-// or, where that is NaN, of the table.
+// Rms difference of the other frequencies from the finest one, rad. Its fringe order is that of the
+// coordinate, or, where that is NaN, of the table.
 double DisagreementRad(const FringeDecoder& decoder, const std::vector<std::complex<double>>& phasors,
                        double coordinate_px);
 

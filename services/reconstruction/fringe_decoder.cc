@@ -55,7 +55,9 @@ void TakeMedians(std::span<const cv::Mat> frames, const FringeDecoder& decoder, 
   HistogramMedian sigma(0, 2, 4000);
   PixelSampler sampler(frames, decoder.estimator(), scale);
   const int step = 2 * SamplingStep(view.cause.size());  // 5000 are plenty for a median
-  for (int row = step / 2 & ~1; row < view.cause.rows; row += step) {  // even ones, for their variances
+  // Even rows, for their variances.
+  const int first = step / 2 & ~1;
+  for (int row = first; row < view.cause.rows; row += step) {
     for (int column = step / 2; column < view.cause.cols; column += step) {
       if (view.cause(row, column) == static_cast<std::uint8_t>(MaskCause::kValid)) {
         modulation.Add(sampler.LeastModulation(row, column));

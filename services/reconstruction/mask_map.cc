@@ -77,8 +77,7 @@ void MaskMap::SetRow(int row, const std::uint8_t* cause) {
 }
 
 void MaskMap::Unmask(int row, int column, MaskCause before) {
-  bits_[Begin(row) + static_cast<std::size_t>(column / kWordPx)] &=
-      ~(std::uint64_t{1} << (column % kWordPx));
+  bits_[Begin(row) + static_cast<std::size_t>(column / kWordPx)] &= ~(std::uint64_t{1} << (column % kWordPx));
   RowCounts& counts = counts_[static_cast<std::size_t>(row)];
   --counts[static_cast<std::size_t>(before)];
   ++counts[0];

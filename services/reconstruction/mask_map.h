@@ -24,7 +24,8 @@ class MaskMap {
   // One valid pixel is to be masked; the bits stay as they are.
   void CountBorder(int row, int pixels);
 
-  // Word i has pixels 64 i and up, from bit 0. Words -1 and words() may be read. No bit beyond the image is set.
+  // Word i has pixels 64 i and up, from bit 0. Words -1 and words() may be read. No bit beyond the image is
+  // set.
   const std::uint64_t* Row(int row) const { return &bits_[Begin(row)]; }
   int words() const { return words_; }
   int rows() const { return static_cast<int>(counts_.size()); }

@@ -69,8 +69,8 @@ struct PackedConstants {
 struct PackedStrip {
   std::array<const std::uint8_t*, 8> frames{};  // I11 I12 I13 I21 I22 I31 I32 and the reference, or nothing
   int length = 0;                               // px: a multiple of 32, at most kMaxLength
-  float* coordinate_px = nullptr;  // NaN where masked, but for pixels of doubtful fringe order
-  std::uint16_t* variance_px2 = nullptr;  // upper half of a float; null: not wanted
+  float* coordinate_px = nullptr;               // NaN where masked, but for pixels of doubtful fringe order
+  std::uint16_t* variance_px2 = nullptr;        // upper half of a float; null: not wanted
   std::uint8_t* cause = nullptr;
 
   // The rest of it from a pixel on.

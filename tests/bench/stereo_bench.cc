@@ -245,6 +245,7 @@ struct Pictures {
     const Case& c = TheCase();
     DecodedScene scene = c.scene;
     scene.noise_px = 0;
+    scene.keeps_masked = true;
     const auto& rig = c.calibration;
     left = Photograph(SeeDecoded(scene, rig.left, PoseFromLeft{}, rig, 1), pattern, 1);
     right = Photograph(SeeDecoded(scene, rig.right, rig.right_from_left, rig, 2), pattern, 2);

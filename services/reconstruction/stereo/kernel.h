@@ -112,9 +112,9 @@ struct PointGeometry {
   const ProjectorModel* projector;  // null: none
 };
 
-// One of a row's results, one behind the other, and where they are to be in the end: whole cache lines, 16 floats,
-// go there past the cache as soon as they are full. What lies before the target's first line and behind what is
-// streamed is left to the caller. target: null, nowhere.
+// One of a row's results, one behind the other, and where they are to be in the end: whole cache lines, 16
+// floats, go there past the cache as soon as they are full. What lies before the target's first line and
+// behind what is streamed is left to the caller. target: null, nowhere.
 struct PointArray {
   float* values;
   float* target;

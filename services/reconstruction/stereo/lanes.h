@@ -59,8 +59,8 @@ FORGESCAN_INLINE Mask IsWithin(Floats value, float low, float high) {
 }
 // Floats of which only the upper halves are stored.
 FORGESCAN_INLINE Floats SelectUpper(Mask mask, const std::uint16_t* yes, const std::uint16_t* no) {
-  const __m256i upper = _mm256_mask_loadu_epi16(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(no)),
-                                                mask.bits, yes);
+  const __m256i upper =
+      _mm256_mask_loadu_epi16(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(no)), mask.bits, yes);
   return (Floats)_mm512_slli_epi32(_mm512_cvtepu16_epi32(upper), 16);
 }
 FORGESCAN_INLINE Floats Sqrt(Floats value) { return _mm512_sqrt_ps(value); }

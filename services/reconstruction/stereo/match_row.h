@@ -251,7 +251,8 @@ inline MatchCounts MatchRow(const MatchTask& task, const DisparityRow& disparity
     once += __builtin_popcount(outcome.once);
     good += __builtin_popcount(outcome.good);
   }
-  return {.candidates = valid, .no_partner = valid - found, .ambiguous = found - once, .left_right = once - good};
+  return {
+      .candidates = valid, .no_partner = valid - found, .ambiguous = found - once, .left_right = once - good};
 }
 
 }  // namespace

@@ -159,7 +159,8 @@ inline __attribute__((noinline)) Mask CheckWithProjector(const PointTask& task, 
 }
 
 // Those that are good, one behind the other.
-FORGESCAN_INLINE void AddPoints(Mask good, SurfacePoint point, Floats sigma, Floats coordinate, PointRow& points) {
+FORGESCAN_INLINE void AddPoints(Mask good, SurfacePoint point, Floats sigma, Floats coordinate,
+                                PointRow& points) {
   if (Bits(good) != 0xffff) {  // nearly all blocks are full
     for (Floats* const value :
          {&point.x, &point.y, &point.z, &point.nx, &point.ny, &point.nz, &sigma, &coordinate}) {

@@ -137,7 +137,8 @@ inline void PrepareRow(int blocks, const SlopeLimits& limits, StereoRow& row) {
   for (int x = 0; x <= blocks * kLanes; x += kLanes) {
     raw = {raw.here, raw.behind, Load(row.raw_px + x + kLanes)};  // NaN behind the row
     steps = steps >> 16 | RightSteps(raw, limits) << 16;
-    const Smoothed next = x < blocks * kLanes ? SmoothBlock(x, raw, steps, limits, row) : Smoothed{none, none};
+    const Smoothed next =
+        x < blocks * kLanes ? SmoothBlock(x, raw, steps, limits, row) : Smoothed{none, none};
     if (x > 0) {
       const Floats step = Shifted<1>(here.coordinate, next.coordinate) - here.coordinate;
       const unsigned pairs = Bits(IsStep(step, limits)), in_pair = (pairs | pairs << 1 | before) & 0xffff;

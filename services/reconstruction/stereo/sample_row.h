@@ -63,7 +63,8 @@ struct Sampled {
   float *raw_px, *variance_px2, *column_px;
 };
 
-FORGESCAN_INLINE void SampleBlock(const RawView& view, const EpipolarBlock& block, int x, const Sampled& row) {
+FORGESCAN_INLINE void SampleBlock(const RawView& view, const EpipolarBlock& block, int x,
+                                  const Sampled& row) {
   const Floats lane = LaneNumbers();
   Store(row.column_px + x, block.column[0] + lane * (block.column[1] + lane * block.column[2]));
   if (block.row_count == 0) {

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <utility>
 #include <vector>
 
@@ -61,6 +62,25 @@ TEST(CloudWriter, GoesOnBehindWhatStays) {
   const std::size_t size = begun.size();
   ExpectAscending(Write(CloudWriter(std::move(begun), size), static_cast<int>(size), 30), size + 29 * 30 / 2,
                   1);
+}
+
+// Written in place; memory that fits a cloud has no room for a whole row more.
+TEST(CloudWriter, GivesRoomForMoreThanComes) {
+  PointCloud cloud = Write(CloudWriter({}), 0, 20);
+  const auto size = static_cast<int>(cloud.size());
+  for (int run = 0; run < 2; ++run) {
+    CloudWriter writer(std::move(cloud));
+    for (int first = 0; first < size; first += 19) {
+      const Row row(first, std::min(19, size - first));
+      const PointTargets to = writer.Room(500);
+      std::copy_n(row.points[0].data(), 3 * row.points.size(), to.points_mm);
+      std::copy_n(row.normals[0].data(), 3 * row.points.size(), to.normals);
+      std::copy_n(row.sigma_mm.data(), row.points.size(), to.sigma_mm);
+      writer.Added(row.points.size());
+    }
+    cloud = std::move(writer).Finish();
+    ExpectAscending(cloud, static_cast<std::size_t>(size), 1);
+  }
 }
 
 TEST(CloudWriter, ThinsARow) {

@@ -77,7 +77,9 @@ DecodedView SeeDecoded(const DecodedScene& scene, const CameraIntrinsics& lens, 
       view.coordinate_px(y, x) = static_cast<float>(seen.column_px + scene.noise_px * noise(random));
     }
   }
-  MaskBorder(view);
+  if (!scene.keeps_masked) {
+    MaskBorder(view);
+  }
   return view;
 }
 

@@ -18,6 +18,8 @@ struct DecodedScene {
   };
   double projector_width_px = 0;
   double noise_px = 0;  // normal, of each coordinate; what variance_px2 says of it
+  // Coordinates of masked pixels stay, 0 where there is no light, and there is no border.
+  bool keeps_masked = false;
 };
 
 // What a camera sees of it. pose: of the camera. Masked: shadows of the projector and holes, with a border of

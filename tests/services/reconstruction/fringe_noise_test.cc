@@ -113,7 +113,7 @@ TEST(FringeDecoder, WrongFringeOrdersAreRarerThanOneIn50000BeforeAnyRepair) {
     const DecodedView view = Decode(Decoder(pattern, config, path), frames);
     long wrong = 0;
     for (int row = 0; row < columns.rows; ++row) {
-      for (int column = 0; column < columns.cols; ++column) {  // all of them, and what is masked counts as wrong
+      for (int column = 0; column < columns.cols; ++column) {  // what is masked counts as wrong
         wrong += !(std::abs(static_cast<double>(view.coordinate_px(row, column)) - columns(row, column)) <=
                    half_period_px);
       }

@@ -60,8 +60,7 @@ Row SampleAll(const StereoKernel& kernel, const Lines& lines) {
     variance[i] = UpperOfFloat(sigma * sigma);
     coordinate[i] = uniform(random) > 0.9F ? kNan : coordinate[i];
   }
-  const RawView view = {
-      coordinate.data(), variance.data(), kWidth, kWidth, kWidth, kHeight, 3, -1};
+  const RawView view = {coordinate.data(), variance.data(), kWidth, kWidth, kWidth, kHeight, 3, -1};
   Row all;
   for (int row = -2; row < kHeight; ++row) {
     std::vector<EpipolarBlock> blocks(kBlocks);
@@ -134,8 +133,17 @@ Row TriangulateAll(const StereoKernel& kernel, bool with_holes) {
   Row out(9 * kRoom, 0);
   float* const at = out.data();
   alignas(64) std::array<float, 3 * kRoom> target{};
-  PointRow points = {{at, target.data(), 0}, {at + 3 * kRoom, nullptr, 0}, {at + 6 * kRoom, nullptr, 0},
-                     at + 7 * kRoom, at + 8 * kRoom, 0, 0, 0, 0, 0, 0};
+  PointRow points = {{at, target.data(), 0},
+                     {at + 3 * kRoom, nullptr, 0},
+                     {at + 6 * kRoom, nullptr, 0},
+                     at + 7 * kRoom,
+                     at + 8 * kRoom,
+                     0,
+                     0,
+                     0,
+                     0,
+                     0,
+                     0};
   const std::vector<EpipolarBlock> nothing(kBlocks);  // to fetch ahead
   kernel.triangulate({rows.data(),
                       &left.row(),

@@ -225,7 +225,8 @@ TEST(StereoPoints, LeaveOutWhatIsNoNumber) {
 TEST(StereoPoints, RefuseViewsThatAreNone) {
   const Views good = See(Plate({}, 0.02));
   Views dark = good;
-  dark.right.coordinate_px = cv::Mat_<float>(good.right.cause.size(), std::numeric_limits<float>::quiet_NaN());
+  dark.right.coordinate_px =
+      cv::Mat_<float>(good.right.cause.size(), std::numeric_limits<float>::quiet_NaN());
   EXPECT_THAT(RunViews(dark).error().message, HasSubstr("the right view changes by 0.0000 px"));
   Views against = good;
   against.right.coordinate_px = cv::Mat_<float>(512 - good.right.coordinate_px);
