@@ -142,7 +142,7 @@ TEST(Found, ALetterBeyondAsciiStandsOnlyInTextsAndComments) {
   };
   EXPECT_THAT(complaint("a = 1\nb = ä\n"), HasSubstr("station.toml: line 2: a character beyond ASCII"));
   for (const char* text : {"ä = 1", "a = 1 、", "\xC9\x85", R"(a = """"""ä)", R"(a = "\ä")",
-                           "a = \"\"\"\\\n  ä\"\"\"", "a = 'b' ä", "a = '''b''''' ä"}) {
+                           "a = \"\"\"\\\n  ä\"\"\"", "a = 'b' ä", "a = '''b''''' ä", "a = 6b'ä'"}) {
     EXPECT_THAT(complaint(text), HasSubstr("beyond ASCII")) << text;
   }
   for (const char* text : {"\uFEFFa = 1", R"(a = "ä\"ä" # ä)", R"(a = '\' # ä)",

@@ -10,6 +10,13 @@ constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
 
 bool IsBeyondAscii(char c) { return static_cast<unsigned char>(c) >= 0x80; }
 
+// Within a number or a name a quote begins no text: the parser goes on to the next blank.
+bool BeginsText(std::string_view text, std::size_t at) {
+  constexpr std::string_view kBefore = " \t\r\n=,[{.";
+  return (text[at] == '"' || text[at] == '\'') &&
+         (at == 0 || kBefore.find(text[at - 1]) != std::string_view::npos);
+}
+
 // Where the text in quotes that begins there ends; at the character itself, if one beyond ASCII is escaped. A
 // text that its line leaves open ends there: the parser refuses it.
 std::size_t EndOfText(std::string_view text, std::size_t begin) {
@@ -36,7 +43,8 @@ std::size_t EndOfText(std::string_view text, std::size_t begin) {
 }  // namespace
 
 Status CheckTomlText(std::string_view text, std::string_view name) {
-  std::size_t at = text.starts_with(kByteOrderMark) ? kByteOrderMark.size() : 0;
+  if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
+  std::size_t at = 0;
   while (at < text.size()) {
     if (IsBeyondAscii(text[at])) {
       return Fail(ErrorCode::kFormat, "{}: line {}: a character beyond ASCII outside a text or comment", name,
@@ -44,7 +52,7 @@ Status CheckTomlText(std::string_view text, std::string_view name) {
     }
     if (text[at] == '#') {
       at = std::min(text.find('\n', at), text.size());
-    } else if (text[at] == '"' || text[at] == '\'') {
+    } else if (BeginsText(text, at)) {
       at = EndOfText(text, at);
     } else {
       ++at;
