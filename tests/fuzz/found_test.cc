@@ -141,12 +141,14 @@ TEST(Found, ALetterBeyondAsciiStandsOnlyInTextsAndComments) {
     return file.ok() ? std::string() : file.error().message;
   };
   EXPECT_THAT(complaint("a = 1\nb = ä\n"), HasSubstr("station.toml: line 2: a character beyond ASCII"));
-  for (const char* text : {"ä = 1", "a = 1 、", "\xC9\x85", R"(a = """"""ä)", R"(a = "\ä")",
-                           "a = \"\"\"\\\n  ä\"\"\"", "a = 'b' ä", "a = '''b''''' ä"}) {
+  for (const char* text :
+       {"ä = 1", "a = 1 、", "\xC9\x85", R"(a = """"""ä)", R"(a = "\ä")", "a = \"\"\"\\\n  ä\"\"\"",
+        "a = 'b' ä", "a = '''b''''' ä", "a = 6b'ä'", "a = 6b='ä'", "a = 6['ä'", "a = 6=['ä'"}) {
     EXPECT_THAT(complaint(text), HasSubstr("beyond ASCII")) << text;
   }
-  for (const char* text : {"\uFEFFa = 1", R"(a = "ä\"ä" # ä)", R"(a = '\' # ä)",
-                           "a = \"\"\"\n\\\n \\nä\"\"\"\"\"", "a = '''ä'\n''ä'''"}) {
+  for (const char* text :
+       {"\uFEFFa = 1", R"(a = "ä\"ä" # ä)", R"(a = '\' # ä)", "b='ä'", "b = [['ä','ä'],['ä']]",
+        "b = {c='ä',d='ä'}", "a = \"\"\"\n\\\n \\nä\"\"\"\"\"", "a = '''ä'\n''ä'''"}) {
     EXPECT_EQ(complaint(text), "") << text;
   }
 }
