@@ -81,6 +81,8 @@ double SpreadMm(const PointCloud& cloud, const Item* begin, const Item* end, con
 
 }  // namespace
 
+double CellRadOf(double focal_px, int every_nth_point) { return 3 * std::sqrt(every_nth_point) / focal_px; }
+
 std::optional<std::uint64_t> DirectionKey(const Eigen::Vector3d& p_in_camera, double cell_rad) {
   const double right = std::floor(p_in_camera.x() / p_in_camera.z() / cell_rad);
   const double down = std::floor(p_in_camera.y() / p_in_camera.z() / cell_rad);

@@ -26,6 +26,9 @@ struct SurfaceCellOptions {
   double max_spread_mm = 0.1;   // rms along the mean normal: more, and it is two surfaces
 };
 
+// A size of cells that hold nine points on average, where every nth pixel of a camera becomes one.
+double CellRadOf(double focal_px, int every_nth_point);
+
 // Of the cell that a point's direction lies in. Nothing for a point that is not in front of the camera, or is
 // no number.
 std::optional<std::uint64_t> DirectionKey(const Eigen::Vector3d& p_in_camera, double cell_rad);
