@@ -2,10 +2,12 @@
 #include <cstdio>
 #include <memory>
 
+#include "services/common/imaging/stereo_calibration.h"
 #include "services/common/service/station.h"
 #include "services/fusion/fusion_config.h"
 #include "services/fusion/standing_file.h"
 #include "services/fusion/visit_correction.h"
+#include "services/reconstruction/reconstruction_service.h"
 #include "tools/finite_range.h"
 #include "tools/forgescan/command.h"
 #include "tools/forgescan/standing/empty_scans.h"
@@ -47,7 +49,12 @@ Status Run(const Arguments& arguments) {
   ASSIGN_OR_RETURN(const std::vector<Eigen::AlignedBox3d> regions, RegionsOf(arguments.regions_mm));
   ASSIGN_OR_RETURN(const Station station, Station::Load(arguments.station));
   ASSIGN_OR_RETURN(const FusionConfig fusion, FusionConfig::Load(station.file.Table("fusion")));
-  ASSIGN_OR_RETURN(const VisitErrorOptions visit, VisitOptionsOf(fusion));
+  ASSIGN_OR_RETURN(VisitErrorOptions visit, VisitOptionsOf(fusion));
+  ASSIGN_OR_RETURN(const auto reconstruction,
+                   ReconstructionServiceConfig::Load(station.file.Table("reconstruction")));
+  ASSIGN_OR_RETURN(const StereoCalibration calibration, LoadStereoCalibration(station.calibration));
+  visit.cells.cell_rad =
+      CellRadOf(calibration.left.camera_matrix(0, 0), reconstruction.publish_every_nth_point);
   ASSIGN_OR_RETURN(const ViewMatrices matrices, ViewMatrices::Load(station.views));
   StandingOrigin origin{matrices.path_crc32, 0};
   ASSIGN_OR_RETURN(origin.calibration_crc32, Crc32OfFile(station.calibration));
