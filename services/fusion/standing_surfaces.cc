@@ -1,6 +1,7 @@
 #include "services/fusion/standing_surfaces.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace forgescan {
 namespace {
@@ -34,9 +35,10 @@ void Append(const PointCloud& cloud, const Eigen::Isometry3d& moved_from_cloud, 
 Result<PointCloud> Averaged(const std::vector<const PointCloud*>& clouds, int view,
                             const VisitErrorOptions& options) {
   const std::vector<SurfaceCell> first = SurfaceCells(*clouds.front(), options.cells);
+  const VisitErrorOptions of_two = AgainstMeanOf(1, options);
   std::vector<Eigen::Isometry3d> first_from_visit{Eigen::Isometry3d::Identity()};
   for (std::size_t i = 1; i < clouds.size(); ++i) {
-    const auto error = EstimateVisitError(first, *clouds[i], options);
+    const auto error = EstimateVisitError(first, *clouds[i], of_two);
     if (!error.ok()) {
       return Fail(error.error().code, "view {}: scan {} against the first: {}", view, i + 1,
                   error.error().message);
@@ -83,6 +85,13 @@ Status Check(std::span<const std::vector<ViewCloud>> scans, const StandingReques
 }
 
 }  // namespace
+
+VisitErrorOptions AgainstMeanOf(int scans, VisitErrorOptions options) {
+  const double factor = std::sqrt(1 + 1.0 / scans);
+  options.robot_shift_mm *= factor;
+  options.robot_turn_rad *= factor;
+  return options;
+}
 
 Result<StandingSurfaces> MakeStandingSurfaces(std::span<const std::vector<ViewCloud>> scans,
                                               const StandingRequest& request) {

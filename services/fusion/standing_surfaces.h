@@ -35,6 +35,10 @@ struct StandingRequest {
   VisitErrorOptions visit;  // of the robot whose scans these are
 };
 
+// Two visits differ by more than one scatters: by the error of the second and that of the first, which is the
+// mean of so many scans. With the robot's standard deviations of that.
+VisitErrorOptions AgainstMeanOf(int scans, VisitErrorOptions options);
+
 // Purpose: the reference from scans of the cell without a part, each a cloud for some of the views; the
 // temperatures of the views are not used. Method: each cloud is moved into the first one of its view
 // (visit_error), then all by the mean of these motions, so that no single visit's error is in the reference;

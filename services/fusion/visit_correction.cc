@@ -16,7 +16,9 @@ Result<VisitErrorOptions> VisitOptionsOf(const FusionConfig& config) {
 }
 
 VisitCorrection::VisitCorrection(StandingSurfaces standing, VisitErrorOptions options, std::size_t min_cells)
-    : standing_(std::move(standing)), options_(options), min_cells_(min_cells) {
+    : standing_(std::move(standing)),
+      options_(AgainstMeanOf(standing_.scans, options)),
+      min_cells_(min_cells) {
   options_.cells.cell_rad = standing_.cell_rad;
 }
 

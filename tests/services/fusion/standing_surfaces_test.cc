@@ -110,6 +110,19 @@ TEST(VisitCorrection, ReplacesTheRobotsErrorWhereEnoughIsSeen) {
   EXPECT_FALSE(correction.Of(1, Moved(Corner(2), Motion({0.08, 0, 0}, {0, 0, 0}))).ok());
 }
 
+// 0.005 mm of the robot and as much of the one scan of the reference: a knock is more than 6 x 0.0071 mm.
+TEST(VisitCorrection, TheReferenceHasAnErrorToo) {
+  EXPECT_NEAR(AgainstMeanOf(1, {}).robot_shift_mm, 0.00707, 1e-5);
+  EXPECT_NEAR(AgainstMeanOf(4, {}).robot_turn_rad / VisitErrorOptions().robot_turn_rad, 1.118, 1e-3);
+  const ViewMatrices matrices = TwoViews();
+  const std::vector<std::vector<ViewCloud>> scans{ScanOf(Corner(1))};
+  const auto standing = MakeStandingSurfaces(scans, {{}, matrices, {&kEverywhere, 1}, {}});
+  ASSERT_TRUE(standing.ok()) << standing.error().message;
+  const VisitCorrection correction(*standing, {}, 100);
+  EXPECT_TRUE(correction.Of(1, Moved(Corner(2), Motion({0.036, 0, 0}, {0, 0, 0}).inverse())).ok());
+  EXPECT_FALSE(correction.Of(1, Moved(Corner(2), Motion({0.050, 0, 0}, {0, 0, 0}).inverse())).ok());
+}
+
 TEST(VisitCorrection, AsksForWhatTheRobotScatters) {
   EXPECT_THAT(VisitOptionsOf(FusionConfig()).error().message, HasSubstr("robot_shift_mm and robot_turn_rad"));
   FusionConfig config;
