@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
 
 #include "services/fusion/standing_file.h"
 #include "tests/line/sim_line.h"
@@ -107,6 +108,25 @@ TEST_F(StandingLineTest, TheRecordingHoldsTheFileAndReplaysToEqualBytes) {
     EXPECT_GT(counts.equal, 0) << channel;
     EXPECT_TRUE(counts.Same()) << channel;
   }
+}
+
+TEST_F(StandingLineTest, AnotherCalibrationAsksForAnotherFile) {
+  const auto session = RecordedSession::Open({Log(kPart)});
+  ASSERT_TRUE(session.ok()) << session.error().message;
+  const auto scratch = ScratchFolder::Make();
+  ASSERT_TRUE(scratch.ok());
+  const fs::path other = folder_->path() / "other.yaml";
+  fs::copy_file(cell_->folder() / "calibration/stereo.yaml", other);
+  std::ofstream(other, std::ios::app) << "# calibrated again\n";
+  const auto station = UnpackStation(
+      *session, {.config = "", .values = {}, .files = {{"calibration", other}}}, scratch->path());
+  ASSERT_TRUE(station.ok()) << station.error().message;
+  ReplayOptions options;
+  options.services = *SelectServices({"fusion"});
+  const auto outcome = Replay(*session, *station, options);
+  ASSERT_FALSE(outcome.ok());
+  EXPECT_THAT(outcome.error().message,
+              HasSubstr("standing.ply: its surfaces were seen with the calibration"));
 }
 
 // Without a part the scan has no temperatures and no verdict on sizes, but its points are in the recording.
