@@ -1,5 +1,7 @@
 #include "drivers/line/line_sim.h"
 
+#include <cmath>
+
 namespace forgescan {
 namespace {
 
@@ -62,9 +64,10 @@ void LineSim::MoveParts() {
 
 void LineSim::ReportPyrometer() {
   LinePyrometer reading{.utime = now_us_, .part = part_.part};
-  reading.valid = part_.in_place && temperature_ && !faults_.pyrometer_blind;
-  if (reading.valid) {
-    reading.part_degc = temperature_(part_.part, now_us_ - in_place_us_);
+  if (part_.in_place && temperature_ && !faults_.pyrometer_blind) {
+    const double degc = temperature_(part_.part, now_us_ - in_place_us_);
+    reading.valid = !std::isnan(degc);
+    reading.part_degc = reading.valid ? degc : reading.part_degc;
   }
   Emit(reading);
 }

@@ -27,7 +27,7 @@ struct LineSimFaults {
 
 class LineSim final : public LineSignals {
  public:
-  // Temperature of a part at a time; what the pyrometer reads.
+  // Temperature of a part at a time, degC; what the pyrometer reads. NaN: it sees no part.
   using Temperature = std::function<double(std::uint32_t part, std::int64_t in_place_us)>;
 
   explicit LineSim(const LineSimConfig& config = {}) : config_(config) {}

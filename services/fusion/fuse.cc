@@ -47,8 +47,9 @@ Result<FusedCloud> FuseViews(std::span<const ViewCloud> views, const ViewMatrice
                    [&](std::size_t a, std::size_t b) { return views[a].view < views[b].view; });
   for (const std::size_t i : order) {
     const ViewCloud& view = views[i];
-    Append(view.cloud_in_camera, matrices.array_from_camera[static_cast<std::size_t>(view.view)],
-           fused.scales[i], options, fused.cloud_in_array);
+    const Eigen::Isometry3d array_from_camera =
+        matrices.array_from_camera[static_cast<std::size_t>(view.view)] * view.taught_from_actual;
+    Append(view.cloud_in_camera, array_from_camera, fused.scales[i], options, fused.cloud_in_array);
     fused.cloud_in_array.view.insert(fused.cloud_in_array.view.end(), view.cloud_in_camera.size(),
                                      static_cast<std::uint16_t>(view.view));
   }

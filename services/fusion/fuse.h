@@ -13,6 +13,8 @@ struct ViewCloud {
   int view = 0;
   double temperature_degc = 0.0;  // of the part while the view was taken
   PointCloud cloud_in_camera;
+  // The robot's error at this visit (visit_error.h); identity where nothing tells it.
+  Eigen::Isometry3d taught_from_actual = Eigen::Isometry3d::Identity();
 };
 
 struct FuseOptions {

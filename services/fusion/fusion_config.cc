@@ -14,6 +14,12 @@ Result<FusionConfig> FusionConfig::Load(ConfigTable table) {
   table.Optional("view_timeout_s", config.view_timeout_s, 1.0, 3600.0);
   table.Optional("max_body_change_k", config.max_body_change_k, 0.1, 200.0);
   table.Optional("body_change_voids", config.body_change_voids);
+  if (table.Has("robot_shift_mm") || table.Has("robot_turn_rad")) {
+    table.Required("robot_shift_mm", config.robot_shift_mm.emplace(), 0.0001, 1.0);
+    table.Required("robot_turn_rad", config.robot_turn_rad.emplace(), 1e-7, 0.01);
+  }
+  table.Optional("min_standing_cells", config.min_standing_cells, 1, 100'000);
+  table.Optional("max_robot_sigmas", config.max_robot_sigmas, 1.0, 100.0);
   RETURN_IF_ERROR(table.Finish());
   return config;
 }

@@ -1,6 +1,7 @@
 // Configuration of the fusion service: table [fusion] of station.toml.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "services/common/config/config.h"
@@ -20,6 +21,11 @@ struct FusionConfig {
   // robot.
   double max_body_change_k = 5.0;
   bool body_change_voids = false;
+  // What the robot scatters, standard deviations on each axis about the middle of a view. Required with
+  // standing surfaces, and used for nothing else.
+  std::optional<double> robot_shift_mm, robot_turn_rad;
+  int min_standing_cells = 100;  // fewer that a view has seen again, and it keeps the robot's error
+  double max_robot_sigmas = 6;   // an error beyond so many standard deviations is a knock: the view is void
 
   static Result<FusionConfig> Load(ConfigTable table);
 };

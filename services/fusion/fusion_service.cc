@@ -19,13 +19,11 @@ constexpr std::int64_t kAfterScanUs = 10'000'000;
 
 }  // namespace
 
-FusionService::FusionService(StreamHub& hub, ServiceMonitor& monitor, FusionConfig config,
-                             ViewMatrices matrices, ExpansionCurve curve)
+FusionService::FusionService(StreamHub& hub, ServiceMonitor& monitor, FusionConfig config, FusionFiles files)
     : hub_(hub),
       monitor_(monitor),
       config_(std::move(config)),
-      matrices_(std::move(matrices)),
-      curve_(std::move(curve)),
+      files_(std::move(files)),
       parts_(kMaxPartsInWork),
       finished_(kFinishedKept) {
   hub_.Advertise(kFusedCloud);
@@ -115,13 +113,13 @@ void FusionService::OnArrived(const fsmsg::part_arrived_t& arrived) {
 }
 
 void FusionService::OnViewReady(const fsmsg::view_ready_t& ready) {
-  const double change_k = std::abs(ready.robot_body_degc - matrices_.recorded_body_degc);
+  const double change_k = std::abs(ready.robot_body_degc - files_.matrices.recorded_body_degc);
   if (change_k <= config_.max_body_change_k) {  // not so for NaN
     return;
   }
   const std::string reason = fmt::format(
       "the robot's body has {:.1f} degC, {:.1f} degC when the view matrices were taught, allowed are {} K",
-      ready.robot_body_degc, matrices_.recorded_body_degc, config_.max_body_change_k);
+      ready.robot_body_degc, files_.matrices.recorded_body_degc, config_.max_body_change_k);
   monitor_.Count("views_off_temperature");
   monitor_.ReportError(Fail(ErrorCode::kUntrusted, "part {} view {}: {}", ready.part, ready.view, reason));
   PartCollector* part = config_.body_change_voids ? Part(ready) : nullptr;
@@ -139,9 +137,28 @@ void FusionService::OnCloudSlice(const fsmsg::cloud_slice_t& slice) {
   if (!cloud.ok()) {
     monitor_.ReportError(cloud.error());
   } else if (cloud->has_value()) {
-    part->OnCloud(slice.view, slice.utime, std::move(**cloud));
+    auto taught_from_actual = Correct(slice.part, slice.view, **cloud);
+    part->OnCloud(slice.view, slice.utime, std::move(**cloud), std::move(taught_from_actual));
     FinishIfSettled(slice.part);
   }
+}
+
+Result<Eigen::Isometry3d> FusionService::Correct(int part, int view, const PointCloud& cloud) {
+  if (!files_.correction.has_value()) {
+    return Eigen::Isometry3d::Identity();
+  }
+  const Result<CorrectedVisit> visit = files_.correction->Of(view, cloud);
+  if (!visit.ok()) {
+    monitor_.Count("views_knocked");
+    monitor_.ReportError(Fail(visit.error().code, "part {} view {}: {}", part, view, visit.error().message));
+    return visit.error();
+  }
+  monitor_.Count(visit->corrected ? "views_corrected" : "views_uncorrected");
+  monitor_.SetCounter("last_view_cells", static_cast<std::int64_t>(visit->cells));
+  monitor_.SetCounter("last_view_shift_um", std::llround(visit->shift_um));
+  monitor_.SetCounter("last_view_turn_urad", std::llround(visit->turn_urad));
+  monitor_.SetState(ServiceState::kReady, fmt::format("part {} view {}: {}", part, view, visit->text));
+  return visit->taught_from_actual;
 }
 
 void FusionService::OnScanComplete(const fsmsg::scan_complete_t& scan) {
@@ -177,9 +194,9 @@ std::string FusionService::VoidReason(const PartCollector& collector,
     return "the part's arrival was not seen";
   }
   const auto crc = static_cast<std::uint32_t>(collector.arrived()->path_crc32);
-  if (crc != matrices_.path_crc32) {
+  if (crc != files_.matrices.path_crc32) {
     return fmt::format("the robot's path {:08x} is not the one the view matrices were taught on, {:08x}", crc,
-                       matrices_.path_crc32);
+                       files_.matrices.path_crc32);
   }
   std::string voids;  // the first with its reason; the table of views has the others'
   for (const auto& view : views.summary) {
@@ -207,7 +224,7 @@ void FusionService::Finish(int part, PartCollector& collector) {
   if (result.reason.empty()) {
     const auto& fixed = config_.fixed_point_mm;
     Result<FusedCloud> fused =
-        FuseViews(views.clouds, matrices_, curve_,
+        FuseViews(views.clouds, files_.matrices, files_.curve,
                   {config_.reference_temperature_degc, {fixed[0], fixed[1], fixed[2]}});
     result.reason = fused.ok() ? std::string() : fused.error().message;
     if (fused.ok()) {

@@ -8,13 +8,20 @@
 #include "services/fusion/fuse.h"
 #include "services/fusion/fusion_config.h"
 #include "services/fusion/part_collector.h"
+#include "services/fusion/visit_correction.h"
 
 namespace forgescan {
 
+// What the files of a station say.
+struct FusionFiles {
+  ViewMatrices matrices;
+  ExpansionCurve curve;
+  std::optional<VisitCorrection> correction;  // nothing: the station has no standing surfaces
+};
+
 class FusionService {
  public:
-  FusionService(StreamHub& hub, ServiceMonitor& monitor, FusionConfig config, ViewMatrices matrices,
-                ExpansionCurve curve);
+  FusionService(StreamHub& hub, ServiceMonitor& monitor, FusionConfig config, FusionFiles files);
 
  private:
   // A part that has its result.
@@ -35,6 +42,8 @@ class FusionService {
   void OnArrived(const fsmsg::part_arrived_t& arrived);
   void OnViewReady(const fsmsg::view_ready_t& ready);
   void OnCloudSlice(const fsmsg::cloud_slice_t& slice);
+  // The robot's error when this cloud was taken, counted and named; the error voids the view.
+  Result<Eigen::Isometry3d> Correct(int part, int view, const PointCloud& cloud);
   void OnScanComplete(const fsmsg::scan_complete_t& scan);
   void FinishIfSettled(int part);
   void Finish(int part, PartCollector& collector);
@@ -45,8 +54,7 @@ class FusionService {
   StreamHub& hub_;
   ServiceMonitor& monitor_;
   FusionConfig config_;
-  ViewMatrices matrices_;
-  ExpansionCurve curve_;
+  FusionFiles files_;
   CloudAssembler assembler_;
   AgedMap<int, PartCollector> parts_;  // in work
   AgedMap<int, Finished> finished_;

@@ -34,7 +34,8 @@ std::optional<std::string> PartCollector::VoidReason(const View& view) const {
   if (view.result.has_value() && view.cloud.has_value() && view.cloud_utime == view.result->utime &&
       view.temperature.has_value()) {
     const bool whole = static_cast<std::size_t>(view.result->points) == view.cloud->size();
-    return whole ? std::string() : "the cloud is not the one the reconstruction announced";
+    if (!whole) return "the cloud is not the one the reconstruction announced";
+    return view.taught_from_actual.ok() ? std::string() : view.taught_from_actual.error().message;
   }
   if (!view.result.has_value() && scan_->status != fsmsg::scan_complete_t::STATUS_COMPLETE &&
       AllCapturedHaveResults()) {
@@ -84,7 +85,7 @@ PartCollector::Views PartCollector::TakeViews() {
     }
     if (summary.reason.empty()) {
       summary.temperature_degc = view.temperature->temperature_degc;
-      taken.clouds.push_back({k, summary.temperature_degc, std::move(*view.cloud)});
+      taken.clouds.push_back({k, summary.temperature_degc, std::move(*view.cloud), *view.taught_from_actual});
     }
     taken.summary.push_back(summary);
   }

@@ -37,9 +37,12 @@ class PartCollector {
   void OnArrived(const fsmsg::part_arrived_t& arrived) { arrived_ = arrived; }
   void OnViewResult(const fsmsg::view_result_t& result);
   // utime: of the view the cloud shows. A cloud with another time than the view's result is not used.
-  void OnCloud(int view, std::int64_t utime, PointCloud cloud) {
+  // taught_from_actual: the robot's error then, or why the view is void with this cloud.
+  void OnCloud(int view, std::int64_t utime, PointCloud cloud,
+               Result<Eigen::Isometry3d> taught_from_actual = Eigen::Isometry3d::Identity()) {
     views_[view].cloud = std::move(cloud);
     views_[view].cloud_utime = utime;
+    views_[view].taught_from_actual = std::move(taught_from_actual);
   }
   void OnTemperature(const fsmsg::part_temperature_t& temperature) {
     views_[temperature.view].temperature = temperature;
@@ -69,6 +72,7 @@ class PartCollector {
     std::optional<fsmsg::view_result_t> result;
     std::optional<PointCloud> cloud;
     std::int64_t cloud_utime = 0;
+    Result<Eigen::Isometry3d> taught_from_actual = Eigen::Isometry3d::Identity();
     std::optional<fsmsg::part_temperature_t> temperature;
     std::optional<std::string> void_reason;
   };

@@ -45,11 +45,14 @@ Matches Join(std::span<const SurfaceCell> standing, std::span<const SurfaceCell>
     }
     const Eigen::Vector3d normal = (a.normal + b.normal).normalized();
     const double distance_mm = normal.dot(b.point - a.point);
+    if (distance_mm > options.hidden_mm) continue;
     if (std::abs(distance_mm) > options.max_distance_mm) {
       ++matches.far;
       continue;
     }
-    Match match{DirectionKey(a.point, options.patch_rad), {}, distance_mm, a.variance_mm2 + b.variance_mm2};
+    const std::uint64_t patch =
+        DirectionKey(a.point, options.patch_rad).value_or(0);  // NaN: refused in the end
+    Match match{patch, {}, distance_mm, a.variance_mm2 + b.variance_mm2};
     match.gradient << normal, (b.point - pivot).cross(normal);
     matches.near.push_back(match);
   }
@@ -136,7 +139,8 @@ Result<VisitError> EstimateVisitError(std::span<const SurfaceCell> standing,
                 shift_mm, 1e6 * turn_rad, options.max_sigmas);
   }
   const Matrix6 covariance = InverseOf(Build(matches.near, twist, options).information);
-  return VisitError{MotionOf(twist, pivot), covariance.diagonal().cwiseSqrt(), matches.near.size()};
+  return VisitError{MotionOf(twist, pivot), twist.head<3>().norm(), covariance.diagonal().cwiseSqrt(),
+                    matches.near.size()};
 }
 
 }  // namespace forgescan

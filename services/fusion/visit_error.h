@@ -20,6 +20,7 @@ struct VisitErrorOptions {
       0.005;  // standard deviations of the robot's error, each axis, about the view's middle
   double robot_turn_rad = 0.000024;
   double max_distance_mm = 0.15;  // farther than that is another surface
+  double hidden_mm = 10;          // so far before it, and it is hidden, by the part: that tells nothing
   double min_cos_normals = 0.97;  // 14 degrees
   double patch_rad = 0.03;        // errors within such a piece, 20 mm at 650 mm, go together,
   double patch_mm = 0.0005;       // with this standard deviation
@@ -28,6 +29,7 @@ struct VisitErrorOptions {
 
 struct VisitError {
   Eigen::Isometry3d taught_from_actual = Eigen::Isometry3d::Identity();  // camera frame, mm
+  double shift_mm = 0;                                                   // of the middle of the cloud
   // Of shift along (mm) and turn about (rad) the axes; the robot's own where nothing that stands still tells.
   Vector6 standard = Vector6::Zero();
   std::size_t cells = 0;  // that both clouds have

@@ -36,6 +36,9 @@ Result<std::vector<StationFile>> StationFilesOf(const Station& station) {
         {"features", &station.features}}) {
     files.push_back({role + fs::path(*path).extension().string(), *path});
   }
+  if (!station.standing.empty()) {
+    files.push_back({"standing" + fs::path(station.standing).extension().string(), station.standing});
+  }
   for (const StationFile& file : files) {
     RETURN_IF_ERROR(BytesOf(file));
   }

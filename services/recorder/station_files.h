@@ -18,7 +18,7 @@ struct StationFile {
 };
 
 // station.toml, and by role with the file's own extension: calibration.yaml, pattern.toml, views.toml,
-// model.bundle, features.toml. Errors: kNotFound, kInvalidArgument (larger than
+// model.bundle, features.toml, and standing.ply if the station has one. Errors: kNotFound, kInvalidArgument (larger than
 // kMaxStationFileBytes), of the first that is wrong.
 Result<std::vector<StationFile>> StationFilesOf(const Station& station);
 

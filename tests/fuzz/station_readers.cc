@@ -10,6 +10,7 @@
 #include "services/common/service/station.h"
 #include "services/cooling/cooling_config.h"
 #include "services/fusion/fusion_config.h"
+#include "services/fusion/standing_file.h"
 #include "services/fusion/view_matrices.h"
 #include "services/reconstruction/pattern_set.h"
 #include "services/reconstruction/reconstruction_service.h"
@@ -112,6 +113,30 @@ array_from_camera = [1, 0, 0, 5, 0, 1, 0, 6, 0, 0, 1, 7, 0, 0, 0, 1]
 index = 1
 array_from_camera = [0.0, -1.0, 0, -5.5, 1, 0, 0, 600, 0, 0, 1, 7e2, 0, 0, 0, 1]
 )";
+
+Outcome ReadStanding(const std::string& bytes) {
+  return Judge(LoadStandingSurfaces(ScratchFile("standing.ply", bytes), {1, 2}, 2), "standing.ply",
+               [](const StandingSurfaces& standing) {
+                 for (const auto& view : standing.views) {
+                   for (const SurfaceCell& cell : view) {
+                     if (!cell.point.allFinite() || !(cell.variance_mm2 > 0))
+                       return "a cell that is no number";
+                   }
+                 }
+                 return "";
+               });
+}
+
+std::string StandingBytes() {
+  StandingSurfaces standing{{1, 2}, 0.003, 1, std::vector<std::vector<SurfaceCell>>(2)};
+  for (int i = 0; i < 10; ++i) {
+    const Eigen::Vector3d point(3.0 * i + 1, 1, 650);
+    standing.views[static_cast<std::size_t>(i % 2)].push_back(
+        {DirectionKey(point, standing.cell_rad).value(), point, -Eigen::Vector3d::UnitZ(), 1e-4});
+  }
+  const std::string path = ScratchFile("written.ply", "");
+  return WriteStandingSurfaces(path, standing).ok() ? ReadInputFile(path).value() : std::string();
+}
 
 Outcome ReadPattern(const std::string& bytes) {
   return Judge(ParsePatternSet(bytes, "pattern.toml"), "pattern.toml",
@@ -230,6 +255,7 @@ std::vector<Reader> Readers() {
       {"calibration", 3000, {CalibrationText()}, ReadCalibration},
       {"pattern", 5000, {kPattern}, ReadPattern},
       {"views", 3000, {kViews}, ReadViews},
+      {"standing", 5000, {StandingBytes()}, ReadStanding},
       {"part_memory", 3000, {"7 1700000000000000 10 3 0 0\n8 1700000000000001 10 10 1 1\n"}, ReadPartMemory},
       {"kept_parts", 3000, {KeptPartsText()}, ReadKeptParts},
       {"history", 500, {HistoryBytes()}, ReadHistory},

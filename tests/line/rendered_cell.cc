@@ -2,12 +2,15 @@
 
 #include <unistd.h>
 
+#include <cmath>
 #include <fstream>
+#include <regex>
 #include <sstream>
 #include <string_view>
 
 #include "services/common/model/bundle_file.h"
 #include "services/common/model/model_import.h"
+#include "tools/forgescan/standing/empty_cell.h"
 #include "tools/virtual_station/commissioning.h"
 #include "tools/virtual_station/station_writer.h"
 #include "tools/virtual_station/virtual_cell.h"
@@ -20,12 +23,20 @@ namespace fs = std::filesystem;
 
 constexpr int kScaleDivisor = 4;
 constexpr int kThreads = 2;
+constexpr double kOutOfSightMm = 30'000;
 // Of a sixteenth of the pixels, more points are kept.
 constexpr std::string_view kThinning = "publish_every_nth_point = 8";
 constexpr std::string_view kThinningOfSmallImages = "publish_every_nth_point = 2";
+// The posts are narrow: a cell of theirs needs every point.
+constexpr std::string_view kNoThinning = "publish_every_nth_point = 1";
 const fs::path kStation = FORGESCAN_SOURCE_DIR "/stations/virtual";
 
-Status WriteFiles(const CellConfig& config, const fs::path& folder) {
+// Both keys, whatever their values are.
+std::string WithoutStanding(const std::string& station) {
+  return std::regex_replace(station, std::regex("\n(standing|robot_shift_mm|robot_turn_rad) = [^\n]*"), "");
+}
+
+Status WriteFiles(const CellConfig& config, const fs::path& folder, StandingPosts posts) {
   RETURN_IF_ERROR(WriteStation(config, ProjectedSet::kReduced, folder.string()));
   std::stringstream station;
   station << std::ifstream(kStation / "station.toml").rdbuf();
@@ -34,8 +45,11 @@ Status WriteFiles(const CellConfig& config, const fs::path& folder) {
   if (thinning == std::string::npos) {
     return Fail(ErrorCode::kNotFound, "{}: \"{}\" is not in it", kStation.string(), kThinning);
   }
-  commissioned.replace(thinning, kThinning.size(), kThinningOfSmallImages);
-  RETURN_IF_ERROR(WriteWholeFile((folder / "station.toml").string(), commissioned));
+  const bool used = posts == StandingPosts::kUsed;
+  commissioned.replace(thinning, kThinning.size(), used ? kNoThinning : kThinningOfSmallImages);
+  RETURN_IF_ERROR(WriteWholeFile((folder / "station.toml").string(),
+                                 used ? commissioned : WithoutStanding(commissioned)));
+  RETURN_IF_ERROR(WriteStandingOf(config, folder.string(), kThreads));
   ASSIGN_OR_RETURN(const ModelBundle model, LoadModel(folder / "model" / "axle.step", {}));
   return WriteBundle(model, folder / "model" / "axle.bundle");
 }
@@ -57,10 +71,10 @@ RenderedCell::~RenderedCell() {
   fs::remove_all(folder_, ignored);
 }
 
-Result<std::unique_ptr<RenderedCell>> RenderedCell::Create() {
+Result<std::unique_ptr<RenderedCell>> RenderedCell::Create(StandingPosts posts) {
   ASSIGN_OR_RETURN(CellConfig config, LoadCellConfig(kStation / "cell.toml", kScaleDivisor));
   const fs::path folder = fs::temp_directory_path() / fmt::format("forgescan_line_{}", ::getpid());
-  RETURN_IF_ERROR(WriteFiles(config, folder));
+  RETURN_IF_ERROR(WriteFiles(config, folder, posts));
   return std::unique_ptr<RenderedCell>(new RenderedCell(std::make_unique<Cell>(std::move(config)), folder));
 }
 
@@ -74,9 +88,11 @@ Result<const RenderedView*> RenderedCell::View(int part, int view) {
     return &found->second;
   }
   const VirtualCell& cell = cell_->cell;
-  ASSIGN_OR_RETURN(const PartState part_state, cell.Part(part));
+  ASSIGN_OR_RETURN(PartState part_state, cell.Part(part));
+  const bool is_there = !taken_away_.contains(part);
+  if (!is_there) part_state.array_from_part.translation().x() += kOutOfSightMm;
   ASSIGN_OR_RETURN(const ViewState view_state, cell.View(part_state, view));
-  RenderedView rendered{.pyrometer_degc = view_state.pyrometer_degc, .images = {}};
+  RenderedView rendered{.pyrometer_degc = is_there ? view_state.pyrometer_degc : std::nan(""), .images = {}};
   for (const Side side : {Side::kLeft, Side::kRight}) {
     ASSIGN_OR_RETURN(const GeometryMap map, cell.Map(part_state, view_state, side));
     for (std::size_t i = 0; i < cell_->patterns.size(); ++i) {

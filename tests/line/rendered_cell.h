@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -15,6 +16,10 @@
 #include "services/common/result.h"
 
 namespace forgescan::testing {
+
+// Whether the station corrects the robot's error by the posts of the cell, as stations/virtual does. A scan
+// of the empty cell costs 4 s.
+enum class StandingPosts { kNotUsed, kUsed };
 
 struct RenderedView {
   using Image = std::vector<std::uint8_t>;
@@ -26,7 +31,7 @@ class RenderedCell {
  public:
   // Makes the folder of the station stations/virtual as a run of it would have, model bundle included; it
   // goes with the object. Cost: about 5 s. Errors: kIo, and those of the simulator.
-  static Result<std::unique_ptr<RenderedCell>> Create();
+  static Result<std::unique_ptr<RenderedCell>> Create(StandingPosts posts = StandingPosts::kNotUsed);
   ~RenderedCell();
 
   const std::filesystem::path& folder() const { return folder_; }
@@ -35,6 +40,8 @@ class RenderedCell {
   int view_count() const;
   std::uint32_t path_crc32() const;
 
+  // From now on this part is not there: a scan of the empty cell.
+  void TakeAway(int part) { taken_away_.insert(part); }
   // Renders at the first call; parts from 1. Errors: those of the simulator.
   Result<const RenderedView*> View(int part, int view);
   // Sizes by the names of features.toml, mm at the reference temperature.
@@ -47,6 +54,7 @@ class RenderedCell {
   std::unique_ptr<Cell> cell_;
   std::filesystem::path folder_;
   std::map<std::pair<int, int>, RenderedView> views_;  // part, view
+  std::set<int> taken_away_;
 };
 
 }  // namespace forgescan::testing

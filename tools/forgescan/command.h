@@ -17,6 +17,7 @@ void AddInspectCommand(CLI::App& app, Status& outcome);
 void AddReplayCommand(CLI::App& app, Status& outcome);
 void AddPlayCommand(CLI::App& app, Status& outcome);
 void AddLogCommand(CLI::App& app, Status& outcome);
+void AddStandingCommand(CLI::App& app, Status& outcome);
 void AddExperimentCommand(CLI::App& app, Status& outcome);
 
 }  // namespace forgescan

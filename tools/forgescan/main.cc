@@ -19,6 +19,7 @@ int Run(int argc, char** argv) {
     forgescan::AddReplayCommand(app, outcome);
     forgescan::AddPlayCommand(app, outcome);
     forgescan::AddLogCommand(app, outcome);
+    forgescan::AddStandingCommand(app, outcome);
     forgescan::AddExperimentCommand(app, outcome);
     const auto is_named = [argv](const CLI::App* command) { return command->check_name(argv[1]); };
     if (argc > 1 && argv[1][0] != '-' && app.get_subcommands(is_named).empty()) {

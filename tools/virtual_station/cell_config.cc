@@ -108,12 +108,35 @@ Result<std::vector<BoxConfig>> ReadBoxes(const CellFile& file) {
   return boxes;
 }
 
+Result<std::vector<PostConfig>> ReadPosts(const CellFile& file) {
+  std::vector<PostConfig> posts;
+  if (!file.root.contains("post")) {
+    return posts;
+  }
+  ASSIGN_OR_RETURN(const auto tables, file.Tables("post"));
+  for (const toml::table* table : tables) {
+    const std::string place = fmt::format("{} [[post]] {}", file.path, posts.size());
+    TomlSection s(table, place);
+    PostConfig post;
+    post.top_mm = s.Vector3("top_mm", {-5000, 5000});
+    post.width_mm = s.Number("width_mm", {1, 1000});
+    post.foot_z_mm = s.Number("foot_z_mm", {-5000, 5000});
+    post.turn_deg = s.Number("turn_deg", {-90, 90});
+    RETURN_IF_ERROR(s.Finish());
+    if (!(post.foot_z_mm < post.top_mm.z())) {
+      return Fail(ErrorCode::kFormat, "{}: foot_z_mm must be below the z of top_mm", place);
+    }
+    posts.push_back(post);
+  }
+  return posts;
+}
+
 // Every section is known, and `seed` is the only key outside them.
 Status CheckSections(const CellFile& file) {
   const std::set<std::string> known = {
-      "seed",     "image", "rig",   "camera_left",       "camera_right",        "projector",       "part",
-      "odd_part", "heat",  "robot", "calibration_error", "commissioning_error", "projector_light", "sensor",
-      "surface",  "view",  "box"};
+      "projector", "surface", "rig",      "image",           "commissioning_error", "seed",
+      "robot",     "part",    "odd_part", "projector_light", "camera_right",        "post",
+      "box",       "view",    "heat",     "sensor",          "calibration_error",   "camera_left"};
   for (const auto& [key, node] : file.root) {
     if (!known.contains(std::string(key.str()))) {
       return Fail(ErrorCode::kFormat, "{}: {} is not a section or key of the virtual cell", file.path,
@@ -142,6 +165,7 @@ Result<CellConfig> ReadConfig(const CellFile& file, int scale_divisor) {
   ASSIGN_OR_RETURN(config.surface, ReadSurface(file));
   ASSIGN_OR_RETURN(config.views, ReadViews(file));
   ASSIGN_OR_RETURN(config.boxes, ReadBoxes(file));
+  ASSIGN_OR_RETURN(config.posts, ReadPosts(file));
   return config;
 }
 

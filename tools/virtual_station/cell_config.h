@@ -100,6 +100,14 @@ struct BoxConfig {
   Eigen::Vector3d low_mm, high_mm;
 };
 
+// A square post that stands still beside the part, with three faces to each view that sees it. Array frame.
+struct PostConfig {
+  Eigen::Vector3d top_mm;  // middle of its top
+  double width_mm;
+  double foot_z_mm;
+  double turn_deg;  // about z; 0: its sides face along x and y
+};
+
 struct CellConfig {
   std::uint64_t seed = 0;
   double working_distance_mm = 0.0;
@@ -114,6 +122,7 @@ struct CellConfig {
   SurfaceConfig surface;
   std::vector<ViewConfig> views;
   std::vector<BoxConfig> boxes;
+  std::vector<PostConfig> posts;
 };
 
 // `scale_divisor` overrides image.scale_divisor of the file when it is not 0: tests render 1/4-size images of

@@ -29,18 +29,35 @@ SurfaceMesh Rectangle(const Eigen::Vector3d& origin, const Eigen::Vector3d& u, c
   return mesh;
 }
 
+SurfaceMesh BoxMesh(const BoxConfig& box) {
+  const Eigen::Vector3d size = box.high_mm - box.low_mm;
+  SurfaceMesh mesh;
+  for (int axis = 0; axis < 3; ++axis) {
+    const Eigen::Vector3d u = size((axis + 1) % 3) * Eigen::Vector3d::Unit((axis + 1) % 3);
+    const Eigen::Vector3d v = size((axis + 2) % 3) * Eigen::Vector3d::Unit((axis + 2) % 3);
+    Append(Rectangle(box.low_mm, v, u), mesh);
+    Append(Rectangle(box.low_mm + size(axis) * Eigen::Vector3d::Unit(axis), u, v), mesh);
+  }
+  return mesh;
+}
+
 }  // namespace
 
 SurfaceMesh BuildCellMesh(const std::vector<BoxConfig>& boxes) {
   SurfaceMesh mesh_in_array;
-  for (const BoxConfig& box : boxes) {
-    const Eigen::Vector3d size = box.high_mm - box.low_mm;
-    for (int axis = 0; axis < 3; ++axis) {
-      const Eigen::Vector3d u = size((axis + 1) % 3) * Eigen::Vector3d::Unit((axis + 1) % 3);
-      const Eigen::Vector3d v = size((axis + 2) % 3) * Eigen::Vector3d::Unit((axis + 2) % 3);
-      Append(Rectangle(box.low_mm, v, u), mesh_in_array);
-      Append(Rectangle(box.low_mm + size(axis) * Eigen::Vector3d::Unit(axis), u, v), mesh_in_array);
-    }
+  for (const BoxConfig& box : boxes) Append(BoxMesh(box), mesh_in_array);
+  return mesh_in_array;
+}
+
+SurfaceMesh BuildPostMesh(const std::vector<PostConfig>& posts) {
+  SurfaceMesh mesh_in_array;
+  for (const PostConfig& post : posts) {
+    const double half_mm = 0.5 * post.width_mm;
+    SurfaceMesh mesh_in_post =
+        BoxMesh({{-half_mm, -half_mm, post.foot_z_mm - post.top_mm.z()}, {half_mm, half_mm, 0}});
+    const Eigen::AngleAxisd turn(post.turn_deg * std::numbers::pi / 180.0, Eigen::Vector3d::UnitZ());
+    for (Eigen::Vector3d& v : mesh_in_post.vertices) v = post.top_mm + turn * v;
+    Append(mesh_in_post, mesh_in_array);
   }
   return mesh_in_array;
 }

@@ -13,6 +13,9 @@ namespace forgescan {
 // 25 mm, so that the renderer can tell which parts of the image see something.
 SurfaceMesh BuildCellMesh(const std::vector<BoxConfig>& boxes);
 
+// The same of the posts.
+SurfaceMesh BuildPostMesh(const std::vector<PostConfig>& posts);
+
 // Where the robot was taught to stand for this view.
 Eigen::Isometry3d TaughtRigPose(const ViewConfig& view, double working_distance_mm);
 

@@ -9,7 +9,9 @@ VirtualCell::VirtualCell(CellConfig config, int threads)
       threads_(threads),
       cell_in_array_(BuildCellMesh(config_.boxes)),
       left_rays_(BuildRayTable(config_.rig.left, threads)),
-      right_rays_(BuildRayTable(config_.rig.right, threads)) {}
+      right_rays_(BuildRayTable(config_.rig.right, threads)) {
+  Append(BuildPostMesh(config_.posts), cell_in_array_);
+}
 
 Result<PartState> VirtualCell::Part(int part) const {
   if (part < 0) {

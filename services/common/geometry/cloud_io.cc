@@ -16,8 +16,9 @@ void Append(std::string& bytes, const T& value) {
   bytes.append(reinterpret_cast<const char*>(&value), sizeof(T));
 }
 
-std::string EncodePly(const PointCloud& cloud) {
+std::string EncodePly(const PointCloud& cloud, const std::vector<std::string>& comments) {
   std::string bytes = "ply\nformat binary_little_endian 1.0\ncomment units: mm\n";
+  for (const std::string& comment : comments) bytes += "comment " + comment + "\n";
   bytes +=
       fmt::format("element vertex {}\nproperty float x\nproperty float y\nproperty float z\n", cloud.size());
   bytes += cloud.normals.empty() ? "" : "property float nx\nproperty float ny\nproperty float nz\n";
@@ -51,14 +52,21 @@ Result<TriangleMesh> ReadTriangleMesh(const std::filesystem::path& path) {
   return ParseTriangleMesh(bytes, path.string());
 }
 
-Status WritePly(const std::filesystem::path& path, const PointCloud& cloud) {
+Status WritePly(const std::filesystem::path& path, const PointCloud& cloud,
+                const std::vector<std::string>& comments) {
   const auto fits = [&cloud](std::size_t n) { return n == 0 || n == cloud.size(); };
   if (!fits(cloud.normals.size()) || !fits(cloud.sigma_mm.size()) || !fits(cloud.view.size())) {
     return Fail(ErrorCode::kInvalidArgument,
                 "{}: the cloud has {} points but {} normals, {} sigmas and {} views", path.string(),
                 cloud.size(), cloud.normals.size(), cloud.sigma_mm.size(), cloud.view.size());
   }
-  return WriteOutputFile(path, EncodePly(cloud));
+  for (const std::string& comment : comments) {
+    if (comment.find('\n') != std::string::npos) {
+      return Fail(ErrorCode::kInvalidArgument, "{}: the comment \"{}\" has more than one line", path.string(),
+                  comment);
+    }
+  }
+  return WriteOutputFile(path, EncodePly(cloud, comments));
 }
 
 }  // namespace forgescan

@@ -31,8 +31,9 @@ Result<TriangleMesh> ReadTriangleMesh(const std::filesystem::path& path);
 
 // Writes binary little-endian PLY: points, and normals, sigma_mm and view where the cloud has them. A file
 // is whole or not there, a pipe or device is written directly (output_file.h). Errors: kInvalidArgument
-// (arrays of different length), kIo.
-Status WritePly(const std::filesystem::path& path, const PointCloud& cloud);
+// (arrays of different length, a comment of more than one line), kIo.
+Status WritePly(const std::filesystem::path& path, const PointCloud& cloud,
+                const std::vector<std::string>& comments = {});
 
 // The same on bytes in memory; name is what an error calls them.
 Result<CloudFromFile> ParsePointCloud(std::string_view bytes, std::string_view name);

@@ -137,6 +137,10 @@ Result<PlyHeader> ParsePlyHeader(std::string_view bytes, std::string_view name) 
       break;
     }
     const auto words = SplitWords(bytes.substr(at, end - at));
+    if (!words.empty() && words[0] == "comment") {
+      const std::size_t text = bytes.find("comment", at) + std::string_view("comment ").size();
+      header.comments.emplace_back(bytes.substr(std::min(text, end), end - std::min(text, end)));
+    }
     at = end + 1;
     if (!words.empty() && words[0] == "end_header") {
       header.body_offset = at;

@@ -30,6 +30,7 @@ struct PlyElement {
 struct PlyHeader {
   Encoding encoding = Encoding::kAscii;
   std::vector<PlyElement> elements;
+  std::vector<std::string> comments;  // without the word, in file order
   std::size_t body_offset = 0;  // byte where the first element begins
 };
 

@@ -60,6 +60,10 @@ Result<Station> Station::Load(const std::string& folder) {
     table.Required(key, *path);
     *path = (base / *path).lexically_normal().string();
   }
+  if (table.Has("standing")) {
+    table.Required("standing", station.standing);
+    station.standing = (base / station.standing).lexically_normal().string();
+  }
   RETURN_IF_ERROR(table.Finish());
   RETURN_IF_ERROR(
       file.OnlyTables({"station", "trigger", "camera", "robot", "cooling", "reconstruction", "fusion",

@@ -24,6 +24,7 @@ struct Station {
   std::string views;        // views.toml: the view matrices
   std::string model;        // model bundle
   std::string features;     // features.toml: dimensions and limits
+  std::string standing;     // standing.ply: what stands still about the part; empty = none
   std::string results;      // folder for reports and history
   // Of this station only: a table [service.NAME] starts forgescan-NAME and holds its settings. Alphabetical.
   std::vector<std::string> more_services;

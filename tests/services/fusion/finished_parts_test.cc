@@ -30,7 +30,8 @@ class FinishedPartsTest : public ::testing::Test {
     matrices.recorded_body_degc = 35;
     matrices.array_from_camera.assign(1, Eigen::Isometry3d::Identity());
     service_ = std::make_unique<FusionService>(
-        hub_, monitor_, config, matrices, *ExpansionCurve::Create(config.expansion_degc, config.expansion));
+        hub_, monitor_, config,
+        FusionFiles{matrices, *ExpansionCurve::Create(config.expansion_degc, config.expansion), {}});
     listener_.Subscribe<fsmsg::fusion_result_t>(kFusionResult,
                                                 [this](const auto& result) { results_.push_back(result); });
     network_.RunFor(kSecondUs);

@@ -27,7 +27,8 @@ class FusionServiceTest : public ::testing::Test {
     matrices.path_crc32 = kPathCrc;
     matrices.array_from_camera.assign(2, Eigen::Isometry3d::Identity());
     service_ = std::make_unique<FusionService>(
-        hub_, monitor_, config, matrices, *ExpansionCurve::Create(config.expansion_degc, config.expansion));
+        hub_, monitor_, config,
+        FusionFiles{matrices, *ExpansionCurve::Create(config.expansion_degc, config.expansion), {}});
     listener_.Subscribe<fsmsg::fusion_result_t>(kFusionResult,
                                                 [this](const auto& result) { results_.push_back(result); });
     listener_.Subscribe<fsmsg::cloud_slice_t>(kFusedCloud, [this](const auto& slice) {

@@ -5,59 +5,21 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <random>
+
+#include "tests/services/fusion/standing_scene.h"
 
 namespace forgescan {
 namespace {
 
+using testing::AddSquare;
+using testing::Corner;
 using ::testing::HasSubstr;
-
-constexpr double kNoiseMm = 0.02;
-const Eigen::Vector3d kMiddle(0, 0, 650);  // of what the camera sees
-
-// A square of 100 mm through `center`, a point every 0.6 mm.
-void AddSquare(const Eigen::Vector3d& center, const Eigen::Vector3d& normal, std::mt19937& random,
-               PointCloud& cloud) {
-  std::normal_distribution<double> noise(0, kNoiseMm);
-  const Eigen::Vector3d u = normal.unitOrthogonal(), v = normal.cross(u);
-  for (int i = -83; i <= 83; ++i) {
-    for (int j = -83; j <= 83; ++j) {
-      const Eigen::Vector3d p = center + 0.6 * (i * u + j * v) + noise(random) * normal;
-      cloud.points.push_back(p.cast<float>());
-      cloud.normals.push_back(normal.cast<float>());
-      cloud.sigma_mm.push_back(static_cast<float>(kNoiseMm));
-    }
-  }
-}
-
-PointCloud Plane(unsigned seed) {
-  std::mt19937 random(seed);
-  PointCloud cloud;
-  AddSquare(kMiddle, -Eigen::Vector3d::UnitZ(), random, cloud);
-  return cloud;
-}
-
-// Three squares that fix all six motions.
-PointCloud Corner(unsigned seed) {
-  std::mt19937 random(seed);
-  PointCloud cloud;
-  AddSquare(kMiddle + Eigen::Vector3d(0, 80, 0), Eigen::Vector3d(0, 0, -1), random, cloud);
-  AddSquare(kMiddle + Eigen::Vector3d(90, 0, 0), Eigen::Vector3d(-0.8, 0, -0.6), random, cloud);
-  AddSquare(kMiddle + Eigen::Vector3d(-90, -60, 0), Eigen::Vector3d(0, 0.8, -0.6), random, cloud);
-  return cloud;
-}
-
-PointCloud Moved(PointCloud cloud, const Eigen::Isometry3d& motion) {
-  for (Eigen::Vector3f& p : cloud.points) p = (motion * p.cast<double>()).cast<float>();
-  for (Eigen::Vector3f& n : cloud.normals) n = (motion.linear() * n.cast<double>()).cast<float>();
-  return cloud;
-}
-
-Eigen::Isometry3d Motion(const Eigen::Vector3d& shift_mm, const Eigen::Vector3d& turn_rad) {
-  return Eigen::Translation3d(kMiddle + shift_mm) *
-         Eigen::AngleAxisd(turn_rad.norm(), (turn_rad + Eigen::Vector3d(1e-30, 0, 0)).normalized()) *
-         Eigen::Translation3d(-kMiddle);
-}
+using testing::kMiddle;
+using testing::Motion;
+using testing::Moved;
+using testing::Plane;
 
 Result<VisitError> Estimate(const PointCloud& standing, const PointCloud& now) {
   const VisitErrorOptions options;
@@ -89,6 +51,41 @@ TEST(VisitError, WhatNothingShowsStaysZero) {
   EXPECT_NEAR(shift.z(), 0.01, 0.0006);  // mm, 4 standard deviations
   EXPECT_NEAR(error->standard[0], 0.005, 1e-5);
   EXPECT_LT(error->standard[2], 0.0005);
+}
+
+TEST(SurfaceCells, APointWithoutADirectionIsInNoCell) {
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  for (const Eigen::Vector3d& p :
+       {Eigen::Vector3d(kNan, 0, 1), Eigen::Vector3d(0, 0, kNan), Eigen::Vector3d(1, 1, 0),
+        Eigen::Vector3d(1, 1, -5), Eigen::Vector3d(1e30, 0, 1)}) {
+    EXPECT_FALSE(DirectionKey(p, 0.003).has_value()) << p.transpose();
+  }
+  EXPECT_TRUE(DirectionKey({-100, 100, 650}, 0.003).has_value());
+  PointCloud cloud = Plane(1);
+  const std::size_t cells = SurfaceCells(cloud, {}).size();
+  for (int i = 0; i < 20; ++i) {
+    cloud.points.emplace_back(i % 2 == 0 ? std::nanf("") : 1.F, 1.F, i % 2 == 0 ? 650.F : -650.F);
+    cloud.normals.emplace_back(0.F, 0.F, -1.F);
+    cloud.sigma_mm.push_back(0.02F);
+  }
+  EXPECT_EQ(SurfaceCells(cloud, {}).size(), cells);
+  EXPECT_TRUE(SurfaceCells({}, {}).empty());
+}
+
+TEST(SurfaceCells, HaveAscendingKeysWhereverTheyLie) {
+  PointCloud cloud;
+  for (const double right : {-900.0, 300.0, 0.0, -20.0}) {
+    for (const double down : {500.0, -700.0, 1.0}) {
+      for (int i = 0; i < 6; ++i) {
+        cloud.points.emplace_back(static_cast<float>(right + 0.1 * i), static_cast<float>(down), 650.F);
+        cloud.normals.emplace_back(0.F, 0.F, -1.F);
+        cloud.sigma_mm.push_back(0.02F);
+      }
+    }
+  }
+  const auto cells = SurfaceCells(cloud, {});
+  ASSERT_EQ(cells.size(), 12U);
+  for (std::size_t i = 1; i < cells.size(); ++i) EXPECT_LT(cells[i - 1].key, cells[i].key);
 }
 
 TEST(VisitError, ALoneViewIsLeftAlone) {

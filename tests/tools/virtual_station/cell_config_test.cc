@@ -76,6 +76,15 @@ TEST(CellConfig, OddPartsAreOptionalAndOfTheAxle) {
   EXPECT_THAT(too_long.error().message, HasSubstr("total_length is 3000 mm, allowed"));
 }
 
+TEST(CellConfig, PostsStandOnTheirFeet) {
+  const auto config = LoadCellConfig(kCell);
+  ASSERT_TRUE(config.ok()) << config.error().message;
+  EXPECT_GE(config->posts.size(), 12u);
+  const auto sunk = LoadChanged("foot_z_mm = -250.0", "foot_z_mm = -20.0");
+  ASSERT_FALSE(sunk.ok());
+  EXPECT_THAT(sunk.error().message, HasSubstr("[[post]] 0: foot_z_mm must be below the z of top_mm"));
+}
+
 TEST(CellConfig, NamesFileKeyAndLimits) {
   const auto out_of_range = LoadChanged("baseline_mm = 250.0", "baseline_mm = 2.0");
   ASSERT_FALSE(out_of_range.ok());

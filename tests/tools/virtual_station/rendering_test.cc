@@ -94,8 +94,34 @@ TEST(Rendering, AVisitOfItsOwnGivesAnImageOfItsOwn) {
   EXPECT_NE(cell.View(*part, 1, 15.0, 0)->pyrometer_degc, cell.View(*part, 1, 15.0, 1)->pyrometer_degc);
 }
 
+// The posts are there for the robot's error; they must cost no point of the part.
+TEST(Rendering, PostsHideNothingOfThePart) {
+  auto config = LoadCellConfig(kCell, 8);
+  ASSERT_TRUE(config.ok()) << config.error().message;
+  const VirtualCell with(*config, 2);
+  config->posts.clear();
+  const VirtualCell without(*config, 2);
+  const auto part = with.Part(2);
+  ASSERT_TRUE(part.ok()) << part.error().message;
+  const auto lit_of_part = [&](const VirtualCell& cell, int view) {
+    const auto map = cell.Map(*part, *cell.View(*part, view), Side::kLeft);
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < map->sample.size(); ++i) {
+      count += map->surface[i] == Surface::kPart && map->sample[i].lit > 0 ? 1 : 0;
+    }
+    return count;
+  };
+  for (int view = 0; view < static_cast<int>(config->views.size()); ++view) {
+    const double before = static_cast<double>(lit_of_part(without, view));
+    EXPECT_GT(static_cast<double>(lit_of_part(with, view)), 0.998 * before)
+        << "view " << view;  // the beam's foot
+  }
+}
+
 TEST(Rendering, ForeignShareAsInThePaper) {
-  const VirtualCell cell(Config(), 2);
+  CellConfig config = Config();
+  config.posts.clear();  // the paper's cell has none
+  const VirtualCell cell(config, 2);
   const auto part = cell.Part(0);
   ASSERT_TRUE(part.ok());
   const double usable_dn = 8.0 / cell.config().projector_light.amplitude;  // modulation of 8 DN

@@ -97,6 +97,16 @@ TEST(Scene, WearMakesPlatesSmallerPartByPart) {
   EXPECT_NEAR(ActualSize(config, 7, 9).left_plate_width_mm, first + 9 * config.plate_wear_mm_per_part, 1e-9);
 }
 
+TEST(Scene, APostIsTurnedAboutItsOwnMiddle) {
+  const SurfaceMesh mesh = BuildPostMesh({{{100, -200, -50}, 30, -250, 45}});
+  Eigen::AlignedBox3d box;
+  for (const Eigen::Vector3d& v : mesh.vertices) box.extend(v);
+  const double reach_mm = 15 * std::sqrt(2.0);  // of a corner
+  EXPECT_LT((box.min() - Eigen::Vector3d(100 - reach_mm, -200 - reach_mm, -250)).norm(),
+            1e-9);  // mm: rounding
+  EXPECT_LT((box.max() - Eigen::Vector3d(100 + reach_mm, -200 + reach_mm, -50)).norm(), 1e-9);
+}
+
 TEST(Scene, AnOddPartHasItsOneSizeAndTheOthersOfItsTurn) {
   PartConfig config = Config().part;
   config.odd_parts.clear();

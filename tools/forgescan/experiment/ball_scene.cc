@@ -43,6 +43,7 @@ std::array<Eigen::Vector3d, 2> BallCenters() {
 CellConfig BallCell(CellConfig config) {
   config.views = {{{0, 0, 0}, {0, 0.7, 0.7}, {-1, 0, 0}, 1.0}};
   config.boxes = {{{-120, -80, -70}, {120, 80, -60}}};
+  config.posts.clear();
   config.surface.texture_contrast = 0;
   config.part.odd_parts.clear();
   return config;

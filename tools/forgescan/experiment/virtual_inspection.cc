@@ -39,12 +39,6 @@ Result<StationFiles> LoadFiles(const std::string& folder, int threads) {
   return files;
 }
 
-std::vector<cv::Mat> Render(const VirtualCell& cell, const GeometryMap& map, const ViewState& view, Side side,
-                            int threads) {
-  const ImageKey key{cell.config().seed, view.part, view.view, view.visit, side, 0};
-  return ExposeAll(map, cell.config(), cell.Patterns(ProjectedSet::kReduced), key, threads);
-}
-
 PointCloud PartInModel(const PointCloud& cloud, const std::vector<std::uint32_t>& part,
                        const Eigen::Isometry3d& model_from_array) {
   PointCloud moved;
@@ -107,19 +101,6 @@ Result<VirtualInspection> VirtualInspection::Create(CellConfig config, const Exp
   return inspection;
 }
 
-Result<ViewCloud> VirtualInspection::Scan(const PartState& part, const ViewState& view) const {
-  std::array<std::vector<cv::Mat>, 2> images;
-  for (const Side side : {Side::kLeft, Side::kRight}) {
-    ASSIGN_OR_RETURN(const GeometryMap map, cell_->Map(part, view, side));
-    images[static_cast<std::size_t>(side)] = Render(*cell_, map, view, side, threads_);
-  }
-  auto result = reconstructor_->Run(images[0], images[1]);
-  if (!result.ok()) {
-    return Fail(result.error().code, "visit {}, view {}: {}", view.visit, view.view, result.error().message);
-  }
-  return ViewCloud{view.view, view.pyrometer_degc, std::move(result->cloud_in_camera)};
-}
-
 Result<InspectedPart> VirtualInspection::Measure(const std::vector<ViewCloud>& views,
                                                  const ViewMatrices& matrices) const {
   const FusionConfig& fusion = files_.fusion;
@@ -143,38 +124,21 @@ Result<InspectedPart> VirtualInspection::Measure(const std::vector<ViewCloud>& v
   return inspected;
 }
 
-Result<StandingSurfaces> VirtualInspection::ScanWithout(PartState part,
-                                                        const std::vector<ViewState>& views) const {
-  constexpr double kOutOfSightMm = 30'000;
-  part.array_from_part.translation().x() += kOutOfSightMm;
-  StandingSurfaces standing;
-  for (const ViewState& view : views) {
-    const Result<ViewCloud> scan = Scan(part, view);
-    // Refused, or not a pixel lit: too little stands still in this view's sight.
-    if (!scan.ok() && scan.error().code != ErrorCode::kUntrusted &&
-        scan.error().code != ErrorCode::kDegenerate) {
-      return scan.error();
-    }
-    standing.push_back(scan.ok() ? SurfaceCells(scan->cloud_in_camera, VisitErrorOptions().cells)
-                                 : std::vector<SurfaceCell>());
-  }
-  return standing;
-}
-
-Result<ViewMatrices> VirtualInspection::MatricesOfVisit(const std::vector<ViewCloud>& views,
-                                                        const StandingSurfaces& standing) const {
+Result<VisitCorrection> VirtualInspection::Correction(const PartState& part,
+                                                      const std::vector<ViewState>& views) const {
   const RobotScatter& robot = config().robot;
-  VisitErrorOptions options;
-  options.robot_shift_mm = robot.position_sd_mm;
-  options.robot_turn_rad = robot.rotation_sd_rad;
-  ViewMatrices matrices = files_.views;
-  for (const ViewCloud& view : views) {
-    const auto index = static_cast<std::size_t>(view.view);
-    ASSIGN_OR_RETURN(const VisitError error,
-                     EstimateVisitError(standing.at(index), view.cloud_in_camera, options));
-    matrices.array_from_camera[index] = matrices.array_from_camera[index] * error.taught_from_actual;
-  }
-  return matrices;
+  VisitErrorOptions visit;
+  visit.robot_shift_mm = robot.position_sd_mm;
+  visit.robot_turn_rad = robot.rotation_sd_rad;
+  visit.cells.cell_rad =
+      CellRadOf(files_.calibration.left.camera_matrix(0, 0), files_.reconstruction.publish_every_nth_point);
+  std::vector<std::vector<ViewCloud>> scans(1);
+  ASSIGN_OR_RETURN(scans[0], ScanEmptyCell(*cell_, *reconstructor_, part, views));
+  const auto regions = PostRegions(config().posts);
+  ASSIGN_OR_RETURN(StandingSurfaces standing,
+                   MakeStandingSurfaces(scans, {{}, files_.views, regions, visit}));
+  return VisitCorrection(std::move(standing), visit,
+                         static_cast<std::size_t>(files_.fusion.min_standing_cells));
 }
 
 ViewState ScatterAtTarget(const ViewState& view, const CellConfig& config) {

@@ -11,11 +11,12 @@
 #include "services/common/imaging/stereo_calibration.h"
 #include "services/fusion/fuse.h"
 #include "services/fusion/fusion_config.h"
-#include "services/fusion/visit_error.h"
+#include "services/fusion/visit_correction.h"
 #include "services/reconstruction/reconstruction_service.h"
 #include "services/registration/registration_config.h"
 #include "services/report/model_evaluator.h"
 #include "tools/forgescan/experiment/experiment.h"
+#include "tools/forgescan/standing/empty_cell.h"
 #include "tools/virtual_station/virtual_cell.h"
 
 namespace forgescan {
@@ -47,9 +48,6 @@ struct InspectedPart {
   std::size_t points = 0, part_points = 0;
 };
 
-// What stands still about the part, by view, as cells of its cloud; none where a view sees too little of it.
-using StandingSurfaces = std::vector<std::vector<SurfaceCell>>;
-
 class VirtualInspection {
  public:
   static Result<VirtualInspection> Create(CellConfig config, const ExperimentOptions& options);
@@ -59,7 +57,9 @@ class VirtualInspection {
 
   // Images of both cameras, reconstruction, thinning as the service publishes. The view's temperature is what
   // the pyrometer says.
-  Result<ViewCloud> Scan(const PartState& part, const ViewState& view) const;
+  Result<ViewCloud> Scan(const PartState& part, const ViewState& view) const {
+    return ScanView(*cell_, *reconstructor_, part, view);
+  }
   // Fusion, registration, dimensions.
   Result<InspectedPart> Measure(const std::vector<ViewCloud>& views) const {
     return Measure(views, files_.views);
@@ -69,12 +69,9 @@ class VirtualInspection {
 
   const ViewMatrices& matrices() const { return files_.views; }
 
-  // The views of the cell without the part.
-  Result<StandingSurfaces> ScanWithout(PartState part, const std::vector<ViewState>& views) const;
-  // The view matrices with the robot's error of this visit as the standing surfaces show it. Errors: those of
-  // EstimateVisitError.
-  Result<ViewMatrices> MatricesOfVisit(const std::vector<ViewCloud>& views,
-                                       const StandingSurfaces& standing) const;
+  // By the posts, as one scan of the cell without the part shows them in these views. The robot's standard
+  // deviations are the cell's, as a station's are measured.
+  Result<VisitCorrection> Correction(const PartState& part, const std::vector<ViewState>& views) const;
 
  private:
   VirtualInspection() = default;

@@ -24,12 +24,14 @@ struct Role {
   const char* name;
   std::string Station::*path;
   std::array<std::string_view, 2> services;  // that read it
+  bool optional = false;                     // a station may do without
 };
 constexpr Role kRoles[] = {{"calibration", &Station::calibration, {"reconstruction"}},
                            {"pattern", &Station::pattern, {"reconstruction"}},
                            {"views", &Station::views, {"fusion"}},
                            {"model", &Station::model, {"registration", "report"}},
-                           {"features", &Station::features, {"report"}}};
+                           {"features", &Station::features, {"report"}},
+                           {"standing", &Station::standing, {"fusion"}, true}};
 
 Result<toml::table> ParseToml(std::string_view text, const std::string& name) {
   RETURN_IF_ERROR(CheckTomlText(text, name));
@@ -185,6 +187,7 @@ Result<Station> UnpackStation(const RecordedSession& session, const StationChang
   RETURN_IF_ERROR(WriteOutputFile(folder / kStationFile, config));
   ASSIGN_OR_RETURN(Station station, Station::Load(folder.string()));
   for (const Role& role : kRoles) {
+    if (role.optional && (station.*role.path).empty() && !changes.files.contains(role.name)) continue;
     ASSIGN_OR_RETURN(station.*role.path, UnpackFile(session, changes, role.name, folder));
   }
   station.results = (folder / "results").string();
@@ -216,6 +219,10 @@ Result<std::vector<std::string>> DescribeChanges(const RecordedSession& session,
   }
   for (const Role& role : kRoles) {
     const fsmsg::recorded_file_t* file = FindFile(session, role.name);
+    if ((station.*role.path).empty()) {
+      if (file != nullptr) lines.push_back(fmt::format("{} is not used, recorded with a file", role.name));
+      continue;
+    }
     ASSIGN_OR_RETURN(const std::string used, ReadInputFile(station.*role.path));
     if (file == nullptr || TextOf(*file) != used) {
       lines.push_back(fmt::format("{} is another file: {}", role.name, station.*role.path));

@@ -15,7 +15,7 @@ namespace forgescan {
 struct StationChanges {
   std::string config;                        // another station.toml; empty = the recorded one
   std::vector<std::string> values;           // "table.key=value", value as in TOML
-  std::map<std::string, std::string> files;  // by role (calibration, pattern, views, model, features)
+  std::map<std::string, std::string> files;  // by role (calibration, pattern, views, model, features, standing)
   bool Any() const { return !config.empty() || !values.empty() || !files.empty(); }
 };
 

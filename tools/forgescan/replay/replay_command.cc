@@ -232,7 +232,7 @@ void AddReplayCommand(CLI::App& app, Status& outcome) {
       ->allow_extra_args(false);
   command->add_option("--config", arguments.changes.config, "what if: another station.toml")
       ->check(CLI::ExistingFile);
-  for (const char* role : {"calibration", "pattern", "views", "model", "features"}) {
+  for (const char* role : {"calibration", "pattern", "views", "model", "features", "standing"}) {
     command
         ->add_option_function<std::string>(
             std::string("--") + role,

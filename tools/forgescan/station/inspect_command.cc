@@ -15,6 +15,7 @@
 #include "services/common/model/model_import.h"
 #include "tools/finite_range.h"
 #include "tools/forgescan/command.h"
+#include "tools/forgescan/standing/empty_cell.h"
 #include "tools/forgescan/station/interrupt.h"
 #include "tools/forgescan/station/network.h"
 #include "tools/forgescan/station/run_outcome.h"
@@ -28,6 +29,8 @@ namespace fs = std::filesystem;
 constexpr std::int64_t kReadyPatienceUs = 60'000'000;
 constexpr std::int64_t kPagePatienceUs =
     10'000'000;  // the report service itself waits no longer than half of it
+
+constexpr int kPreparingThreads = 2;
 
 struct InspectOptions {
   int parts = 1;
@@ -196,6 +199,8 @@ Status Prepare(const InspectOptions& options, const fs::path& run) {
   RETURN_IF_ERROR(prepare.Start("virtual_station_prepare", command));
   RETURN_IF_ERROR(prepare.WaitForSuccess());
   ASSIGN_OR_RETURN(const Station station, Station::Load((run / "station").string()));
+  ASSIGN_OR_RETURN(const CellConfig cell, LoadCellConfig((run / "cell.toml").string()));
+  RETURN_IF_ERROR(WriteStandingOf(cell, (run / "station").string(), kPreparingThreads));
   ASSIGN_OR_RETURN(const ModelBundle model,
                    LoadModel(run / "station" / "model" / "axle.step", options.model));
   return WriteBundle(model, station.model);

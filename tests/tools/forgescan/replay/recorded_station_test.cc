@@ -37,10 +37,10 @@ class RecordedStationTest : public ::testing::Test {
   void SetUp() override {
     Record({"calibration.yaml", "pattern.toml", "views.toml", "model.bundle", "features.toml"});
   }
-  void Record(const std::vector<std::string>& files) {
+  void Record(const std::vector<std::string>& files, const std::string& station = kStation) {
     std::filesystem::remove(folder_ / "one.lcmlog");
     WrittenRecording recording(folder_ / "one.lcmlog");
-    recording.File("station.toml", kStation);
+    recording.File("station.toml", station);
     for (const std::string& file : files) {
       recording.File(file, "recorded " + file);
     }
@@ -98,6 +98,29 @@ TEST_F(RecordedStationTest, TakesAnotherConfigurationAndOtherFiles) {
   EXPECT_EQ(Text(station->calibration), "another");
   EXPECT_THAT(Changes(*station), Contains(HasSubstr("calibration is another file")));
   EXPECT_THAT(Changes(*station), Contains("fusion.view_timeout_s = 61, recorded as 60"));
+}
+
+TEST_F(RecordedStationTest, AStationMayHaveStandingSurfaces) {
+  EXPECT_EQ(Unpack({})->standing, "");
+  const std::vector<std::string> files{"calibration.yaml", "pattern.toml",  "views.toml",
+                                       "model.bundle",     "features.toml", "standing.ply"};
+  std::string with = kStation;
+  with.insert(with.find("results ="), "standing = \"views/standing.ply\"\n");
+  Record(files, with);
+  const auto station = Unpack({});
+  ASSERT_TRUE(station.ok()) << station.error().message;
+  EXPECT_EQ(Text(station->standing), "recorded standing.ply");
+  EXPECT_THAT(Changes(*station), IsEmpty());
+  Record({files.begin(), files.end() - 1}, with);
+  EXPECT_THAT(Unpack({}).error().message, HasSubstr("holds no file for standing; --standing FILE gives one"));
+}
+
+TEST_F(RecordedStationTest, StandingSurfacesMayBeGivenToAStationThatHadNone) {
+  std::ofstream(folder_ / "mine.ply") << "mine";
+  const auto station = Unpack({.config = "", .values = {}, .files = {{"standing", folder_ / "mine.ply"}}});
+  ASSERT_TRUE(station.ok()) << station.error().message;
+  EXPECT_EQ(Text(station->standing), "mine");
+  EXPECT_THAT(Changes(*station), Contains(HasSubstr("standing is another file")));
 }
 
 TEST_F(RecordedStationTest, RefusesWhatIsNoValue) {
