@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "services/camera/camera_config.h"
+#include "services/common/calibration/placements_file.h"
 #include "services/common/imaging/stereo_calibration.h"
 #include "services/common/input_file.h"
 #include "services/common/service/station.h"
@@ -112,6 +113,34 @@ array_from_camera = [1, 0, 0, 5, 0, 1, 0, 6, 0, 0, 1, 7, 0, 0, 0, 1]
 index = 1
 array_from_camera = [0.0, -1.0, 0, -5.5, 1, 0, 0, 600, 0, 0, 1, 7e2, 0, 0, 0, 1]
 )";
+
+constexpr char kPlacements[] = R"(distance_mm = 125.0123
+expanded_uncertainty_mm = 0.001
+ball_radius_mm = 19.05
+volume_mm = [240, 240, 160]
+[prior]
+focal_px = 0.3
+[[placement]]
+name = "low"
+center_1_mm = [10, 20, 650]
+center_2_mm = [135, 20, 650]
+[[placement]]
+name = "deep"
+center_1_mm = [50, 20.5, 600]
+center_2_mm = [50, 20, 7e2]
+)";
+
+// Whatever the file says, the refinement it is for ends with a sentence: two placements are too few.
+Outcome ReadPlacements(const std::string& bytes) {
+  return Judge(ParsePlacements(bytes, "bar.toml", ScratchFolder()), "bar.toml",
+               [](const PlacementsFile& file) -> std::string {
+                 const auto placements = MeasurePlacements(file);
+                 if (!placements.ok()) return SentenceProblem(placements.error(), "");
+                 const auto rig = LoadStereoCalibration(ScratchFile("good.yaml", CalibrationText()));
+                 const auto refined = RefineCalibration(*rig, file.bar, *placements, file.options);
+                 return refined.ok() ? "a refinement from two placements" : "";
+               });
+}
 
 Outcome ReadPattern(const std::string& bytes) {
   return Judge(ParsePatternSet(bytes, "pattern.toml"), "pattern.toml",
@@ -228,6 +257,7 @@ std::vector<Reader> Readers() {
       {"station", 1500, {RepositoryFile("stations/template/station.toml")}, ReadStation},
       {"cell", 1000, {RepositoryFile("stations/virtual/cell.toml")}, ReadCell},
       {"calibration", 3000, {CalibrationText()}, ReadCalibration},
+      {"placements", 3000, {kPlacements}, ReadPlacements},
       {"pattern", 5000, {kPattern}, ReadPattern},
       {"views", 3000, {kViews}, ReadViews},
       {"part_memory", 3000, {"7 1700000000000000 10 3 0 0\n8 1700000000000001 10 10 1 1\n"}, ReadPartMemory},

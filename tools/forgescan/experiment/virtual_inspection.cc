@@ -39,12 +39,6 @@ Result<StationFiles> LoadFiles(const std::string& folder, int threads) {
   return files;
 }
 
-std::vector<cv::Mat> Render(const VirtualCell& cell, const GeometryMap& map, const ViewState& view, Side side,
-                            int threads) {
-  const ImageKey key{cell.config().seed, view.part, view.view, view.visit, side, 0};
-  return ExposeAll(map, cell.config(), cell.Patterns(ProjectedSet::kReduced), key, threads);
-}
-
 PointCloud PartInModel(const PointCloud& cloud, const std::vector<std::uint32_t>& part,
                        const Eigen::Isometry3d& model_from_array) {
   PointCloud moved;
@@ -88,10 +82,27 @@ std::vector<cv::Mat> ExposeAll(const GeometryMap& map, const CellConfig& config,
   return images;
 }
 
+Result<StereoImages> TakeImages(const VirtualCell& cell, const PartState& part, const ViewState& view,
+                                int threads) {
+  StereoImages images;
+  for (const Side side : {Side::kLeft, Side::kRight}) {
+    ASSIGN_OR_RETURN(const GeometryMap map, cell.Map(part, view, side));
+    images[static_cast<std::size_t>(side)] =
+        ExposeAll(map, cell.config(), cell.Patterns(ProjectedSet::kReduced),
+                  {cell.config().seed, view.part, view.view, view.visit, side, 0}, threads);
+  }
+  return images;
+}
+
 Result<VirtualInspection> VirtualInspection::Create(CellConfig config, const ExperimentOptions& options) {
+  ASSIGN_OR_RETURN(StationFiles files, Commission(config, options));
+  return Create(std::move(config), std::move(files), options.threads);
+}
+
+Result<VirtualInspection> VirtualInspection::Create(CellConfig config, StationFiles station, int threads) {
   VirtualInspection inspection;
-  inspection.threads_ = options.threads;
-  ASSIGN_OR_RETURN(inspection.files_, Commission(config, options));
+  inspection.threads_ = threads;
+  inspection.files_ = std::move(station);
   const StationFiles& files = inspection.files_;
   const ImageSize size{config.rig.left.width_px, config.rig.left.height_px};
   ReconstructionConfig reconstruction = files.reconstruction.reconstruction;
@@ -103,16 +114,12 @@ Result<VirtualInspection> VirtualInspection::Create(CellConfig config, const Exp
   inspection.model_ = std::make_shared<const RegistrationModel>(std::move(model));
   ASSIGN_OR_RETURN(auto evaluator, ModelEvaluator::Make(files.model, files.features, files.dimensions));
   inspection.evaluator_ = std::move(evaluator);
-  inspection.cell_ = std::make_shared<const VirtualCell>(std::move(config), options.threads);
+  inspection.cell_ = std::make_shared<const VirtualCell>(std::move(config), threads);
   return inspection;
 }
 
 Result<ViewCloud> VirtualInspection::Scan(const PartState& part, const ViewState& view) const {
-  std::array<std::vector<cv::Mat>, 2> images;
-  for (const Side side : {Side::kLeft, Side::kRight}) {
-    ASSIGN_OR_RETURN(const GeometryMap map, cell_->Map(part, view, side));
-    images[static_cast<std::size_t>(side)] = Render(*cell_, map, view, side, threads_);
-  }
+  ASSIGN_OR_RETURN(const StereoImages images, TakeImages(*cell_, part, view, threads_));
   auto result = reconstructor_->Run(images[0], images[1]);
   if (!result.ok()) {
     return Fail(result.error().code, "visit {}, view {}: {}", view.visit, view.view, result.error().message);
