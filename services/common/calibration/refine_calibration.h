@@ -51,7 +51,7 @@ double LargestError(std::span<const PlacementErrors> placements, double Placemen
 // Least squares over 16 corrections and the certificate's own error, each with its prior standard deviation:
 // what no length shows stays where it was. A placement's error without it follows from its leverage.
 // The projector follows (projector_refit.h). Source: VDI/VDE 2634 parts 2 and 3 (sphere spacing); Luhmann et
-// al., Close-Range Photogrammetry, 3rd ed., 7.3 (scale bars in the adjustment).
+// al., Close-Range Photogrammetry and 3D Imaging (scale bars in the adjustment).
 // Frames: camera = rectified left camera, of the present calibration for what goes in. Shape of the results:
 // as the placements. Deterministic. Errors: those of CheckPlacements and Check(prior); kUntrusted if a
 // placement contradicts the others (named), if all scatter more than their standard deviations say, or if a
