@@ -12,6 +12,7 @@
 #include "services/common/imaging/stereo_calibration_text.h"
 #include "services/common/model/bundle_file.h"
 #include "services/common/model/model_import.h"
+#include "tests/common/calibration/bar_scene.h"
 #include "tests/common/shapes/test_axle.h"
 #include "tests/fuzz/mutate.h"
 #include "tests/fuzz/readers.h"
@@ -128,6 +129,17 @@ std::vector<Case> ModelCases() {
        .outputs = {"out.bundle"}}};
 }
 
+Case RefineCase() {
+  const StereoCalibration written = Corrected(TrueRig(), SomeError());
+  return {.name = "Refine",
+          .files = {{"stereo.yaml", StereoCalibrationText(written)},
+                    {"bar.toml", PlacementsText(MeasuredBar(written, 125, 0.002), 125)}},
+          .damaged = {"stereo.yaml", "bar.toml"},
+          .arguments =
+              "calibration refine --calibration stereo.yaml --placements bar.toml --out b.yaml --json b.json",
+          .outputs = {"b.yaml", "b.json"}};
+}
+
 std::vector<Case> LogCases() {
   const std::map<std::string, std::string> files = {
       {"a.log", SmallRecording(ScratchFolder() / "written.lcmlog")}};
@@ -150,7 +162,7 @@ std::vector<Case> LogCases() {
 
 const std::vector<Case>& Cases() {
   static const std::vector<Case> cases = [] {
-    std::vector<Case> all = {Reconstruct(".png"), Reconstruct(".pgm"), Reconstruct(".tiff")};
+    std::vector<Case> all = {Reconstruct(".png"), Reconstruct(".pgm"), Reconstruct(".tiff"), RefineCase()};
     for (const auto& group : {ModelCases(), LogCases()}) all.insert(all.end(), group.begin(), group.end());
     return all;
   }();

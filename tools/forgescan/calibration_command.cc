@@ -17,6 +17,8 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
+constexpr std::size_t kCheckPlacements = 7;  // VDI/VDE 2634 part 2
+
 struct Arguments {
   std::string calibration, placements, out, json;
   double max_error_mm = 0;
@@ -127,8 +129,9 @@ Status Refine(const Arguments& arguments) {
 Status CheckLengths(const Arguments& arguments) {
   ASSIGN_OR_RETURN(PlacementsFile file, ReadPlacementsFile(arguments.placements));
   ASSIGN_OR_RETURN(const Inputs inputs, ReadInputs(arguments, std::move(file)));
-  RETURN_IF_ERROR(CheckPlacements(inputs.file.bar, inputs.placements, inputs.calibration,
-                                  inputs.file.options.placements));
+  PlacementRules rules = inputs.file.options.placements;
+  rules.min_placements = kCheckPlacements;
+  RETURN_IF_ERROR(CheckPlacements(inputs.file.bar, inputs.placements, inputs.calibration, rules));
   double largest_mm = 0;
   std::printf("placement         distance, mm   error, mm\n");
   for (const BarPlacement& placement : inputs.placements) {

@@ -28,6 +28,10 @@ PoseFromLeft Pose(const Eigen::Isometry3d& target, const Eigen::Isometry3d& left
   return {pose.linear(), pose.translation()};
 }
 
+std::string Numbers(const Eigen::Vector3d& p) {
+  return fmt::format("[{:.6f}, {:.6f}, {:.6f}]", p.x(), p.y(), p.z());
+}
+
 }  // namespace
 
 StereoCalibration TrueRig() {
@@ -80,6 +84,18 @@ std::vector<BarPlacement> MeasuredBar(const StereoCalibration& calibration, doub
     placements.push_back(placement);
   }
   return placements;
+}
+
+std::string PlacementsText(std::span<const BarPlacement> placements, double distance_mm) {
+  std::string text = fmt::format(
+      "distance_mm = {}\nexpanded_uncertainty_mm = 0.001\nball_radius_mm = 19.05\nvolume_mm = [240, 240, "
+      "160]\n",
+      distance_mm);
+  for (const BarPlacement& placement : placements) {
+    text += fmt::format("[[placement]]\nname = \"{}\"\ncenter_1_mm = {}\ncenter_2_mm = {}\n", placement.name,
+                        Numbers(placement.center_in_camera[0]), Numbers(placement.center_in_camera[1]));
+  }
+  return text;
 }
 
 RefinementOptions BarOptions() {

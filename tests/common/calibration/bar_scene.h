@@ -1,6 +1,9 @@
 // A rig of known truth, a calibration of it that is wrong, and a ball bar as that calibration measures it.
 #pragma once
 
+#include <array>
+#include <span>
+#include <string>
 #include <vector>
 
 #include "services/common/calibration/refine_calibration.h"
@@ -19,6 +22,9 @@ std::vector<std::array<Eigen::Vector3d, 2>> BarPlaces(double distance_mm);
 // The bar as the calibration measures it. Noise: standard deviation of each coordinate.
 std::vector<BarPlacement> MeasuredBar(const StereoCalibration& calibration, double distance_mm,
                                       double noise_mm);
+
+// The file of these placements, with the volume of BarPlaces; U = 0.001 mm, balls of 19.05 mm.
+std::string PlacementsText(std::span<const BarPlacement> placements, double distance_mm);
 
 RefinementOptions BarOptions();
 

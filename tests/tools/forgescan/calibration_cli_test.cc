@@ -19,28 +19,12 @@ using ::testing::HasSubstr;
 
 constexpr double kBarMm = 125.0123;
 
-std::string Numbers(const Eigen::Vector3d& p) {
-  return fmt::format("[{:.6f}, {:.6f}, {:.6f}]", p.x(), p.y(), p.z());
-}
-
-std::string PlacementsText(const std::vector<BarPlacement>& placements) {
-  std::string text = fmt::format(
-      "distance_mm = {}\nexpanded_uncertainty_mm = 0.001\nball_radius_mm = 19.05\nvolume_mm = [240, 240, "
-      "160]\n",
-      kBarMm);
-  for (const BarPlacement& placement : placements) {
-    text += fmt::format("[[placement]]\nname = \"{}\"\ncenter_1_mm = {}\ncenter_2_mm = {}\n", placement.name,
-                        Numbers(placement.center_in_camera[0]), Numbers(placement.center_in_camera[1]));
-  }
-  return text;
-}
-
 class CalibrationCli : public ::testing::Test {
  protected:
   void SetUp() override {
     fs::create_directories(folder_);
     Write("stereo.yaml", StereoCalibrationText(written_));
-    Write("bar.toml", PlacementsText(MeasuredBar(written_, kBarMm, 0.002)));
+    Write("bar.toml", PlacementsText(MeasuredBar(written_, kBarMm, 0.002), kBarMm));
   }
   void TearDown() override { fs::remove_all(folder_); }
 
@@ -91,12 +75,12 @@ TEST_F(CalibrationCli, CheckTellsTheSphereSpacingError) {
 TEST_F(CalibrationCli, ARefusalLeavesNoFile) {
   std::vector<BarPlacement> placements = MeasuredBar(written_, kBarMm, 0.002);
   placements[3].center_in_camera[0].x() += 0.1;
-  Write("bar.toml", PlacementsText(placements));
+  Write("bar.toml", PlacementsText(placements, kBarMm));
   const CommandOutput output = Refine();
   EXPECT_EQ(output.exit_code, 1);
   EXPECT_THAT(output.text, HasSubstr("forgescan: placement P4 does not fit the others"));
   EXPECT_FALSE(fs::exists(folder_ / "new.yaml") || fs::exists(folder_ / "new.json"));
-  Write("bar.toml", PlacementsText(MeasuredBar(written_, kBarMm, 0.002)));
+  Write("bar.toml", PlacementsText(MeasuredBar(written_, kBarMm, 0.002), kBarMm));
   EXPECT_EQ(Refine().exit_code, 0);
 }
 

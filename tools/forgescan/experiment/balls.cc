@@ -14,6 +14,7 @@ namespace forgescan {
 namespace {
 
 constexpr int kSeries = 2000;
+constexpr int kStationsARun = 20;
 constexpr double kDistanceGoalMm = 0.010;
 
 std::vector<std::string> Row(const char* what, const Envelope& envelope) {
@@ -67,18 +68,17 @@ double WorstError(const std::vector<BallVisit>& visits, std::array<FittedBall, 2
 }
 
 // What the calibrations alone make of the distance, here and over many stations of the same care.
-std::string CalibrationRemark(const BallStation& station) {
-  constexpr int kStations = 200;
+std::string CalibrationRemark(const BallStation& station, int stations) {
   const auto own_mm = [&](const StereoCalibration& calibration) {
     const BallPair seen = SeenBy(calibration, station.config(), PairCenters(station.config()));
     return (seen[1] - seen[0]).norm() - kBallDistanceMm;
   };
-  const BarStations care = RefineStations(station.config(), kStations, kDistanceGoalMm);
+  const BarStations care = RefineStations(station.config(), stations, kDistanceGoalMm);
   return fmt::format(
       "The calibration alone makes {:+.4f} mm of the distance's error before refinement and {:+.4f} mm after "
       "(truth: its rays, without noise), the same at every scan. Of {} calibrations of the cell's care "
       "{:.0f} % are within {} mm before and {:.0f} % after, {:.0f} % are refused.",
-      own_mm(station.commissioned()), own_mm(station.bar().refinement.calibration), kStations,
+      own_mm(station.commissioned()), own_mm(station.bar().refinement.calibration), stations,
       100.0 * care.within_before, kDistanceGoalMm, 100.0 * care.within_after, 100.0 * care.refused);
 }
 
@@ -224,7 +224,7 @@ Result<ExperimentReport> RunBalls(const ExperimentOptions& options) {
   report.remarks.push_back(fmt::format("Before refinement the worst error of the distance is {:.4f} mm.",
                                        WorstError(visits, &BallVisit::before)));
   report.remarks.push_back(RefinementRemark(station.bar().refinement));
-  report.remarks.push_back(CalibrationRemark(station));
+  report.remarks.push_back(CalibrationRemark(station, kStationsARun * options.runs));
   report.svg = SvgFile("balls", 900, 470,
                        DrawChart(CenterChart(visits, 0), {0, 0, 450, 470}) +
                            DrawChart(CenterChart(visits, 1), {450, 0, 450, 470}));
