@@ -9,8 +9,10 @@
 #include <set>
 
 #include "services/common/geometry/cloud_io.h"
+#include "services/common/imaging/stereo_calibration_text.h"
 #include "services/common/model/bundle_file.h"
 #include "services/common/model/model_import.h"
+#include "tests/common/calibration/bar_scene.h"
 #include "tests/common/shapes/test_axle.h"
 #include "tests/fuzz/mutate.h"
 #include "tests/fuzz/readers.h"
@@ -37,35 +39,6 @@ struct Case {
 std::string Bytes(const fs::path& path) { return ReadInputFile(path).value(); }
 
 std::string Number(double value) { return fmt::format("{:.12g}", value); }
-
-std::string MatrixText(const std::string& key, int rows, int columns, const std::vector<double>& values) {
-  std::string text;
-  for (const double value : values) text += (text.empty() ? "" : ", ") + Number(value);
-  return fmt::format("{}: !!opencv-matrix\n   rows: {}\n   cols: {}\n   dt: d\n   data: [ {} ]\n", key, rows,
-                     columns, text);
-}
-
-std::vector<double> RowMajor(const Eigen::Matrix3d& matrix) {
-  const Eigen::Matrix<double, 3, 3, Eigen::RowMajor> rows = matrix;
-  return {rows.data(), rows.data() + rows.size()};
-}
-
-std::string CalibrationText(const StereoCalibration& rig) {
-  const auto camera = [](const std::string& side, const CameraIntrinsics& intrinsics) {
-    return MatrixText("K" + side, 3, 3, RowMajor(intrinsics.camera_matrix)) +
-           MatrixText("D" + side, 1, static_cast<int>(intrinsics.distortion.size()), intrinsics.distortion);
-  };
-  const auto pose = [](const std::string& side, const PoseFromLeft& from_left) {
-    const Eigen::Vector3d& t = from_left.translation_mm;
-    return MatrixText("R" + side, 3, 3, RowMajor(from_left.rotation)) +
-           MatrixText("T" + side, 3, 1, {t.x(), t.y(), t.z()});
-  };
-  std::string text =
-      "%YAML:1.0\n---\n" + camera("l", rig.left) + camera("r", rig.right) + pose("", rig.right_from_left);
-  if (rig.projector)
-    text += camera("p", rig.projector->intrinsics) + pose("p", rig.projector->projector_from_left);
-  return text;
-}
 
 std::string PatternText(const PatternSet& pattern) {
   std::string text = fmt::format("projector_width_px = {}\nphase_origin_px = {}\nbackground = \"own\"\n",
@@ -101,7 +74,7 @@ Case Reconstruct(const char* ending) {
       result.files[fmt::format("{}/{}.png", side, i)] = std::string(bytes.begin(), bytes.end());
     }
   }
-  result.files["stereo.yaml"] = CalibrationText(rig);
+  result.files["stereo.yaml"] = StereoCalibrationText(rig);
   result.files["pattern.toml"] = PatternText(pattern);
   result.damaged = {"left/0.png", "stereo.yaml", "right/3.png", "pattern.toml", "left/1.png"};
   return result;
@@ -156,6 +129,17 @@ std::vector<Case> ModelCases() {
        .outputs = {"out.bundle"}}};
 }
 
+Case RefineCase() {
+  const StereoCalibration written = Corrected(TrueRig(), SomeError());
+  return {.name = "Refine",
+          .files = {{"stereo.yaml", StereoCalibrationText(written)},
+                    {"bar.toml", PlacementsText(MeasuredBar(written, 125, 0.002), 125)}},
+          .damaged = {"stereo.yaml", "bar.toml"},
+          .arguments =
+              "calibration refine --calibration stereo.yaml --placements bar.toml --out b.yaml --json b.json",
+          .outputs = {"b.yaml", "b.json"}};
+}
+
 std::vector<Case> LogCases() {
   const std::map<std::string, std::string> files = {
       {"a.log", SmallRecording(ScratchFolder() / "written.lcmlog")}};
@@ -178,7 +162,7 @@ std::vector<Case> LogCases() {
 
 const std::vector<Case>& Cases() {
   static const std::vector<Case> cases = [] {
-    std::vector<Case> all = {Reconstruct(".png"), Reconstruct(".pgm"), Reconstruct(".tiff")};
+    std::vector<Case> all = {Reconstruct(".png"), Reconstruct(".pgm"), Reconstruct(".tiff"), RefineCase()};
     for (const auto& group : {ModelCases(), LogCases()}) all.insert(all.end(), group.begin(), group.end());
     return all;
   }();

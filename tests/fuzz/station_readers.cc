@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "services/camera/camera_config.h"
+#include "services/common/calibration/placements_file.h"
 #include "services/common/imaging/stereo_calibration.h"
 #include "services/common/input_file.h"
 #include "services/common/service/station.h"
@@ -138,6 +139,34 @@ std::string StandingBytes() {
   return WriteStandingSurfaces(path, standing).ok() ? ReadInputFile(path).value() : std::string();
 }
 
+constexpr char kPlacements[] = R"(distance_mm = 125.0123
+expanded_uncertainty_mm = 0.001
+ball_radius_mm = 19.05
+volume_mm = [240, 240, 160]
+[prior]
+focal_px = 0.3
+[[placement]]
+name = "low"
+center_1_mm = [10, 20, 650]
+center_2_mm = [135, 20, 650]
+[[placement]]
+name = "deep"
+center_1_mm = [50, 20.5, 600]
+center_2_mm = [50, 20, 7e2]
+)";
+
+// Whatever the file says, the refinement it is for ends with a sentence: two placements are too few.
+Outcome ReadPlacements(const std::string& bytes) {
+  return Judge(ParsePlacements(bytes, "bar.toml", ScratchFolder()), "bar.toml",
+               [](const PlacementsFile& file) -> std::string {
+                 const auto placements = MeasurePlacements(file);
+                 if (!placements.ok()) return SentenceProblem(placements.error(), "");
+                 const auto rig = LoadStereoCalibration(ScratchFile("good.yaml", CalibrationText()));
+                 const auto refined = RefineCalibration(*rig, file.bar, *placements, file.options);
+                 return refined.ok() ? "a refinement from two placements" : "";
+               });
+}
+
 Outcome ReadPattern(const std::string& bytes) {
   return Judge(ParsePatternSet(bytes, "pattern.toml"), "pattern.toml",
                [](const PatternSet& pattern) { return ProblemOf(Check(pattern)); });
@@ -253,6 +282,7 @@ std::vector<Reader> Readers() {
       {"station", 1500, {RepositoryFile("stations/template/station.toml")}, ReadStation},
       {"cell", 1000, {RepositoryFile("stations/virtual/cell.toml")}, ReadCell},
       {"calibration", 3000, {CalibrationText()}, ReadCalibration},
+      {"placements", 3000, {kPlacements}, ReadPlacements},
       {"pattern", 5000, {kPattern}, ReadPattern},
       {"views", 3000, {kViews}, ReadViews},
       {"standing", 5000, {StandingBytes()}, ReadStanding},

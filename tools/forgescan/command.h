@@ -11,6 +11,7 @@ namespace forgescan {
 void AddReconstructCommand(CLI::App& app, Status& outcome);
 void AddRegisterCommand(CLI::App& app, Status& outcome);
 void AddFitCommand(CLI::App& app, Status& outcome);
+void AddCalibrationCommand(CLI::App& app, Status& outcome);
 void AddModelCommand(CLI::App& app, Status& outcome);
 void AddStationCommand(CLI::App& app, Status& outcome);
 void AddInspectCommand(CLI::App& app, Status& outcome);

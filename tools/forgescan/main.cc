@@ -13,6 +13,7 @@ int Run(int argc, char** argv) {
     forgescan::AddReconstructCommand(app, outcome);
     forgescan::AddRegisterCommand(app, outcome);
     forgescan::AddFitCommand(app, outcome);
+    forgescan::AddCalibrationCommand(app, outcome);
     forgescan::AddModelCommand(app, outcome);
     forgescan::AddStationCommand(app, outcome);
     forgescan::AddInspectCommand(app, outcome);

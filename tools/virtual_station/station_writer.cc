@@ -3,9 +3,8 @@
 #include <libdeflate.h>
 
 #include <filesystem>
-#include <opencv2/core/eigen.hpp>
-#include <opencv2/core/persistence.hpp>
 
+#include "services/common/imaging/stereo_calibration_text.h"
 #include "tools/virtual_station/commissioning.h"
 #include "tools/virtual_station/teaching.h"
 #include "tools/virtual_station/whole_file.h"
@@ -15,33 +14,6 @@ namespace {
 
 // Of the robot's body when its views were taught.
 constexpr double kRobotTeachingDegc = 35.0;
-
-void WriteLens(cv::FileStorage& file, const std::string& suffix, const Lens& lens) {
-  const cv::Mat matrix =
-      (cv::Mat_<double>(3, 3) << lens.fx_px, 0, lens.cx_px, 0, lens.fy_px, lens.cy_px, 0, 0, 1);
-  const auto& d = lens.distortion;
-  const cv::Mat distortion = (cv::Mat_<double>(1, 5) << d[0], d[1], d[2], d[3], d[4]);
-  file << "K" + suffix << matrix << "D" + suffix << distortion;
-}
-
-void WritePose(cv::FileStorage& file, const std::string& suffix, const Eigen::Isometry3d& pose) {
-  cv::Mat rotation, translation;
-  cv::eigen2cv(Eigen::Matrix3d(pose.linear()), rotation);
-  cv::eigen2cv(Eigen::Vector3d(pose.translation()), translation);
-  file << "R" + suffix << rotation << "T" + suffix << translation;
-}
-
-Status WriteCalibration(const Rig& rig, const std::string& path) {
-  cv::FileStorage file(".yaml", cv::FileStorage::WRITE | cv::FileStorage::MEMORY);
-  const Eigen::Isometry3d rig_from_left = rig.left.camera_from_rig.inverse();
-  file << "image_width" << rig.left.width_px << "image_height" << rig.left.height_px;
-  WriteLens(file, "l", rig.left.lens);
-  WriteLens(file, "r", rig.right.lens);
-  WritePose(file, "", rig.right.camera_from_rig * rig_from_left);
-  WriteLens(file, "p", rig.projector.lens);
-  WritePose(file, "p", rig.projector.camera_from_rig * rig_from_left);
-  return WriteWholeFile(path, file.releaseAndGetString());
-}
 
 std::string FrequencyText(const std::vector<Pattern>& patterns, double period_px, double modulation_ratio) {
   std::string frames, shifts;
@@ -153,7 +125,8 @@ Status WriteStation(const CellConfig& config, ProjectedSet set, const std::strin
   const std::filesystem::path folder(directory);
   RETURN_IF_ERROR(MakeFolders(folder));
   const Rig calibrated = CalibratedRig(config);
-  RETURN_IF_ERROR(WriteCalibration(calibrated, (folder / "calibration/stereo.yaml").string()));
+  RETURN_IF_ERROR(WriteWholeFile((folder / "calibration/stereo.yaml").string(),
+                                 StereoCalibrationText(CalibrationOf(calibrated))));
   RETURN_IF_ERROR(WriteWholeFile((folder / "pattern.toml").string(), PatternText(config, set)));
   RETURN_IF_ERROR(WriteWholeFile((folder / "views/views.toml").string(),
                                  ViewsText(config, TeachViews(config, calibrated))));

@@ -60,6 +60,34 @@ void AgreeWithCameras(const Rig& truth, double working_distance_mm, Rig& calibra
   calibrated.projector.lens.cy_px += sum_px.y() / count;
 }
 
+CameraIntrinsics IntrinsicsOf(const Lens& lens) {
+  CameraIntrinsics intrinsics;
+  intrinsics.camera_matrix << lens.fx_px, 0, lens.cx_px, 0, lens.fy_px, lens.cy_px, 0, 0, 1;
+  intrinsics.distortion.assign(lens.distortion.begin(), lens.distortion.end());
+  return intrinsics;
+}
+
+Lens LensOf(const CameraIntrinsics& intrinsics) {
+  const Eigen::Matrix3d& k = intrinsics.camera_matrix;
+  Lens lens{k(0, 0), k(1, 1), k(0, 2), k(1, 2), {}};
+  for (std::size_t i = 0; i < lens.distortion.size(); ++i) {
+    lens.distortion[i] = i < intrinsics.distortion.size() ? intrinsics.distortion[i] : 0;
+  }
+  return lens;
+}
+
+PoseFromLeft PoseOf(const PinholeCamera& device, const PinholeCamera& left) {
+  const Eigen::Isometry3d pose = device.camera_from_rig * left.camera_from_rig.inverse();
+  return {pose.linear(), pose.translation()};
+}
+
+Eigen::Isometry3d FromRig(const PoseFromLeft& pose, const PinholeCamera& left) {
+  Eigen::Isometry3d device_from_left = Eigen::Isometry3d::Identity();
+  device_from_left.linear() = pose.rotation;
+  device_from_left.translation() = pose.translation_mm;
+  return device_from_left * left.camera_from_rig;
+}
+
 Eigen::Isometry3d TeachView(const CellConfig& config, const Rig& calibrated,
                             const Rectification& rectification, int view) {
   RandomStream visit(config.seed, RandomUse::kTeachingVisit, {view});
@@ -103,6 +131,27 @@ Rig CalibratedRig(const CellConfig& config) {
         SmallMotion(random, error.translation_sd_mm, error.rotation_sd_rad) * device->camera_from_rig;
   }
   AgreeWithCameras(config.rig, config.working_distance_mm, rig);
+  return rig;
+}
+
+StereoCalibration CalibrationOf(const Rig& rig) {
+  StereoCalibration calibration{IntrinsicsOf(rig.left.lens),
+                                IntrinsicsOf(rig.right.lens),
+                                PoseOf(rig.right, rig.left),
+                                ImageSize{rig.left.width_px, rig.left.height_px},
+                                {}};
+  calibration.projector = {IntrinsicsOf(rig.projector.lens), PoseOf(rig.projector, rig.left)};
+  return calibration;
+}
+
+Rig WithCalibration(Rig rig, const StereoCalibration& calibration) {
+  rig.left.lens = LensOf(calibration.left);
+  rig.right.lens = LensOf(calibration.right);
+  rig.right.camera_from_rig = FromRig(calibration.right_from_left, rig.left);
+  if (calibration.projector) {
+    rig.projector.lens = LensOf(calibration.projector->intrinsics);
+    rig.projector.camera_from_rig = FromRig(calibration.projector->projector_from_left, rig.left);
+  }
   return rig;
 }
 

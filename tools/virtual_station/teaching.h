@@ -6,12 +6,17 @@
 
 #include <vector>
 
+#include "services/common/imaging/stereo_calibration.h"
 #include "tools/virtual_station/cell_config.h"
 
 namespace forgescan {
 
 // The true rig plus seeded errors. Frame: its "rig" is the true rig's.
 Rig CalibratedRig(const CellConfig& config);
+
+// A rig as its calibration file says it, and back: the left camera stays where `rig` has it.
+StereoCalibration CalibrationOf(const Rig& rig);
+Rig WithCalibration(Rig rig, const StereoCalibration& calibration);
 
 // Rectification of a rig as cv::stereoRectify defines it (zero disparity at infinity, default alpha).
 // Frames: rectified = camera frame of P1. Units: mm.

@@ -26,9 +26,10 @@ ExperimentOptions Small(int runs) {
 }
 
 // Runs it twice, on one and on two threads: page and picture must be the same bytes.
-ExperimentReport RunTwice(const std::string& name, int runs) {
+ExperimentReport RunTwice(const std::string& name, int runs, int scale_divisor = 4) {
   const Experiment& experiment = Named(name);
   ExperimentOptions options = Small(runs);
+  options.scale_divisor = scale_divisor;
   const auto once = experiment.run(options);
   options.threads = 1;
   const auto again = experiment.run(options);
@@ -135,11 +136,18 @@ TEST(Experiment, Fig7FollowsTheTheory) {
 }
 
 TEST(Experiment, BallsTellScannerFromRobot) {
-  const ExperimentReport report = RunTwice("balls", 3);
-  EXPECT_LT(GoalValue(report, "scanner's own share"), 0.02);  // mm; images a sixteenth as large
-  EXPECT_LT(GoalValue(report, "worst error"), 0.05);          // mm; the calibration's errors, and noise
+  const ExperimentReport report = RunTwice("balls", 3, 2);     // smaller images show too little of far balls
+  EXPECT_LT(GoalValue(report, "scanner's own share"), 0.006);  // mm; images a quarter as large
+  EXPECT_LT(GoalValue(report, "with standing surfaces"), 0.011);
+  EXPECT_LT(GoalValue(report, "worst error"), 0.010);
   for (std::size_t row = 0; row < 3; ++row) {
-    EXPECT_NEAR(Number(report.tables.at(1), row, "free radius 1 mm"), 19.05, 0.1);
+    EXPECT_GT(std::abs(Number(report.tables.at(1), row, "error before refinement mm")), 0.010);
+    EXPECT_NEAR(Number(report.tables.at(1), row, "free radius 1 mm"), 19.05, 0.02);
+  }
+  const Table& bar = report.tables.at(2);
+  EXPECT_EQ(bar.rows.size(), 20u);
+  for (std::size_t row = 0; row < bar.rows.size(); ++row) {
+    EXPECT_LT(std::abs(Number(bar, row, "refined without it mm")), 0.02);
   }
   EXPECT_FALSE(Named("balls").run(Small(2)).ok());
 }

@@ -43,6 +43,22 @@ TEST(Teaching, PerfectCalibrationAndMarkersGiveTheTaughtPose) {
   }
 }
 
+TEST(Teaching, ARigIsWhatItsCalibrationSays) {
+  const CellConfig config = Config();
+  const Rig calibrated = CalibratedRig(config);
+  const StereoCalibration calibration = CalibrationOf(calibrated);
+  EXPECT_TRUE(Check(calibration).ok());
+  const Rig back = WithCalibration(config.rig, calibration);
+  const Eigen::Vector3d p_in_rig(80, -60, config.working_distance_mm);
+  for (const auto device : {&Rig::left, &Rig::right, &Rig::projector}) {
+    const auto seen = [&](const Rig& rig) {
+      return Project((rig.*device).lens, (rig.*device).camera_from_rig * p_in_rig);
+    };
+    EXPECT_LT((seen(back) - seen(calibrated)).norm(), 1e-9);  // px: rounding
+    EXPECT_GT((seen(back) - seen(config.rig)).norm(), 1e-4);  // px: the calibration's errors
+  }
+}
+
 TEST(Teaching, ViewMatricesAreAsGoodAsTheirMarkers) {
   const CellConfig config = Config();
   CellConfig perfect = config;

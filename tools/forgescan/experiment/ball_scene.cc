@@ -3,6 +3,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "services/common/calibration/rig_geometry.h"
+#include "tools/forgescan/experiment/draws.h"
 #include "tools/virtual_station/scene.h"
 #include "tools/virtual_station/teaching.h"
 
@@ -33,49 +35,90 @@ SurfaceMesh BallMesh(const Eigen::Vector3d& center) {
   return mesh;
 }
 
-}  // namespace
-
-std::array<Eigen::Vector3d, 2> BallCenters() {
-  const Eigen::Vector3d along = Eigen::Vector3d(1.0, 0.25, 0.3).normalized();
-  return {-0.5 * kBallDistanceMm * along, 0.5 * kBallDistanceMm * along};
+// From the middle of the view's field, rig frame: x right, y down, z away from the camera.
+Eigen::Vector3d InArray(const CellConfig& config, const Eigen::Vector3d& from_middle) {
+  return TaughtRigPose(config.views.front(), config.working_distance_mm) *
+         (from_middle + Eigen::Vector3d(0, 0, config.working_distance_mm));
 }
 
-CellConfig BallCell(CellConfig config) {
-  config.views = {{{0, 0, 0}, {0, 0.7, 0.7}, {-1, 0, 0}, 1.0}};
-  config.boxes = {{{-120, -80, -70}, {120, 80, -60}}};
+// About the pair, in sight of cameras and projector.
+std::vector<BoxConfig> Blocks(const CellConfig& config) {
+  constexpr double kHalfMm = 15;
+  std::vector<BoxConfig> boxes;
+  for (const double x : {-105.0, 0.0, 105.0}) {
+    for (const double y : {-75.0, 75.0}) {
+      const Eigen::Vector3d middle = InArray(config, {x, y, 0});
+      const Eigen::Vector3d half = Eigen::Vector3d::Constant(kHalfMm);
+      boxes.push_back({middle - half, middle + half});
+    }
+  }
+  return boxes;
+}
+
+struct Placed {
+  Eigen::Vector3d middle_mm;  // from the middle of the field, rig frame
+  Eigen::Vector3d along;
+};
+
+}  // namespace
+
+CellConfig BarCell(CellConfig config) {
+  config.views = {{{0, 0, 0}, {1, 1, 1}, {-1, 1, 0}, 1.0}};
+  config.boxes.clear();
   config.posts.clear();
   config.surface.texture_contrast = 0;
   config.part.odd_parts.clear();
   return config;
 }
 
-PartState BallPart() {
+CellConfig BallCell(CellConfig config) {
+  config = BarCell(std::move(config));
+  config.boxes = Blocks(config);
+  return config;
+}
+
+BallPair PairCenters(const CellConfig& config) {
+  const Eigen::Vector3d half = 0.5 * kBallDistanceMm * Eigen::Vector3d(1, 0.035, 0.389).normalized();
+  return {InArray(config, -half), InArray(config, half)};
+}
+
+std::vector<BallPair> BarPlacements(const CellConfig& config, double distance_mm) {
+  const std::vector<Placed> planned = {
+      {{-50, -100, 0}, {1, 0, 0}},    {{50, -100, 0}, {1, 0, 0}},     {{-50, 100, 0}, {1, 0, 0}},
+      {{50, 100, 0}, {1, 0, 0}},      {{0, 0, 0}, {1, 0, 0}},         {{-100, -50, 0}, {0, 1, 0}},
+      {{-100, 50, 0}, {0, 1, 0}},     {{100, -50, 0}, {0, 1, 0}},     {{100, 50, 0}, {0, 1, 0}},
+      {{0, 0, -70}, {1, 0, 0}},       {{0, 0, -70}, {0, 1, 0}},       {{-75, 0, 70}, {1, 0, 0}},
+      {{75, 0, 70}, {1, 0, 0}},       {{0, 70, 70}, {0, 1, 0}},       {{-65, -60, 0}, {0.6, 0, 0.8}},
+      {{65, -60, 0}, {-0.6, 0, 0.8}}, {{-65, 60, 0}, {-0.6, 0, 0.8}}, {{65, 60, 0}, {0.6, 0, 0.8}},
+      {{0, -65, 0}, {0, 0.6, 0.8}},   {{0, 65, 0}, {0, -0.6, 0.8}}};
+  constexpr double kByHandMm = 5, kByHandRad = 0.05;
+  RandomStream random = DrawsOf(config.seed, Draw::kBallBar);
+  std::vector<BallPair> placements;
+  for (const Placed& place : planned) {
+    const Eigen::Isometry3d by_hand = SmallMotion(random, kByHandMm, kByHandRad);
+    const Eigen::Vector3d half = 0.5 * distance_mm * (by_hand.linear() * place.along.normalized());
+    const Eigen::Vector3d middle = place.middle_mm + by_hand.translation();
+    placements.push_back({InArray(config, middle - half), InArray(config, middle + half)});
+  }
+  return placements;
+}
+
+PartState BallPart(std::span<const Eigen::Vector3d> centers) {
   PartState part;
   part.start_degc = 925;  // never used: the balls are cold
-  for (const Eigen::Vector3d& center : BallCenters()) Append(BallMesh(center), part.mesh_in_part);
+  for (const Eigen::Vector3d& center : centers) Append(BallMesh(center), part.mesh_in_part);
   return part;
 }
 
-double DistanceByCalibration(const CellConfig& config) {
-  const Rig calibrated = CalibratedRig(config);
-  const Rectification rectification = Rectify(calibrated);
-  const Eigen::Isometry3d rig_from_array =
+BallPair SeenBy(const StereoCalibration& calibration, const CellConfig& config, const BallPair& in_array) {
+  const RigGeometry truth(CalibrationOf(config.rig));
+  const Eigen::Isometry3d left_from_array =
+      config.rig.left.camera_from_rig *
       TaughtRigPose(config.views.front(), config.working_distance_mm).inverse();
-  std::array<Eigen::Vector3d, 2> seen;
-  for (std::size_t i = 0; i < seen.size(); ++i) {
-    const auto ray = [&](const PinholeCamera& truth, const Lens& written, const Eigen::Matrix3d& rectified) {
-      const Eigen::Vector3d p_in_camera = truth.camera_from_rig * (rig_from_array * BallCenters()[i]);
-      const Eigen::Vector2d slope = Unproject(written, Project(truth.lens, p_in_camera));
-      const Eigen::Vector3d direction = rectified * slope.homogeneous();
-      return Eigen::Vector3d(direction / direction.z());
-    };
-    const Eigen::Vector3d left =
-        ray(config.rig.left, calibrated.left.lens, rectification.rectified_from_left);
-    const Eigen::Vector3d right =
-        ray(config.rig.right, calibrated.right.lens, rectification.rectified_from_right);
-    seen[i] = left * (rectification.baseline_mm / (left.x() - right.x()));
-  }
-  return (seen[1] - seen[0]).norm();
+  BallPair in_camera;
+  for (std::size_t i = 0; i < 2; ++i) in_camera[i] = truth.CameraFromLeft(left_from_array * in_array[i]);
+  const std::vector<Eigen::Vector3d> found = RigGeometry(calibration).Triangulated(truth.Seen(in_camera));
+  return {found[0], found[1]};
 }
 
 }  // namespace forgescan

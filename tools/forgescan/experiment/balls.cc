@@ -3,124 +3,37 @@
 #include <cmath>
 
 #include "services/common/features/enclosing_ball.h"
-#include "tools/forgescan/experiment/ball_fit.h"
-#include "tools/forgescan/experiment/ball_scene.h"
+#include "tools/forgescan/experiment/ball_station.h"
+#include "tools/forgescan/experiment/bar_stations.h"
 #include "tools/forgescan/experiment/chart.h"
 #include "tools/forgescan/experiment/draws.h"
-#include "tools/forgescan/experiment/virtual_inspection.h"
+#include "tools/forgescan/experiment/envelope.h"
 #include "tools/virtual_station/scene.h"
 
 namespace forgescan {
 namespace {
 
 constexpr int kSeries = 2000;
+constexpr int kStationsARun = 20;
 constexpr double kDistanceGoalMm = 0.010;
-
-using BallPair = std::array<Eigen::Vector3d, 2>;
-
-struct Visit {
-  BallPair measured;      // centres in the array frame by the taught view matrix
-  BallPair robot;         // where a perfect scanner on this robot would have seen them
-  BallPair robot_at_rig;  // the same, had the robot scattered about the scanner
-  double radius_mm[2];
-};
-
-// Where a point of the scene lies in the array frame for one who takes the robot to be where it was taught.
-Eigen::Vector3d SeenFrom(const ViewState& view, const CellConfig& config, const Eigen::Vector3d& p_in_array) {
-  return TaughtRigPose(config.views.front(), config.working_distance_mm) *
-         (view.array_from_rig.inverse() * p_in_array);
-}
-
-struct Bench {
-  StationFiles files;
-  VirtualCell cell;
-  Reconstructor reconstructor;
-  PartState part;
-};
-
-Result<Visit> Measure(const Bench& bench, int number, int threads) {
-  ASSIGN_OR_RETURN(ViewState at_rig, bench.cell.View(bench.part, 0, 0, number));
-  at_rig.part_degc = 20;
-  at_rig.scale = 1;
-  const ViewState view = ScatterAtTarget(at_rig, bench.cell.config());
-  std::array<std::vector<cv::Mat>, 2> images;
-  for (const Side side : {Side::kLeft, Side::kRight}) {
-    ASSIGN_OR_RETURN(const GeometryMap map, bench.cell.Map(bench.part, view, side));
-    images[static_cast<std::size_t>(side)] =
-        ExposeAll(map, bench.cell.config(), bench.cell.Patterns(ProjectedSet::kReduced),
-                  {bench.cell.config().seed, 0, 0, number, side, 0}, threads);
-  }
-  ASSIGN_OR_RETURN(const Reconstruction result, bench.reconstructor.Run(images[0], images[1]));
-  const Eigen::Isometry3d& array_from_camera = bench.files.views.array_from_camera.front();
-  PointCloud cloud_in_array;
-  for (const Eigen::Vector3f& p : result.cloud_in_camera.points) {
-    cloud_in_array.points.push_back((array_from_camera * p.cast<double>()).cast<float>());
-  }
-  Visit visit;
-  const BallPair placed = BallCenters();
-  for (std::size_t i = 0; i < 2; ++i) {
-    ASSIGN_OR_RETURN(const FittedBall fit,
-                     FitBall(cloud_in_array, placed[i], array_from_camera.translation()));
-    visit.measured[i] = fit.center;
-    visit.radius_mm[i] = fit.radius_mm;
-    visit.robot[i] = SeenFrom(view, bench.cell.config(), placed[i]);
-    visit.robot_at_rig[i] = SeenFrom(at_rig, bench.cell.config(), placed[i]);
-  }
-  return visit;
-}
-
-struct Envelope {
-  double first_mm = 0, second_mm = 0;  // radius of the minimum enclosing ball of each ball's centres
-  double cone_rad = 0;                 // full apex angle of the narrowest cone about the centre lines
-  double iso_mm = 0;                   // ISO 9283: mean distance from the barycentre + 3 standard deviations
-};
-
-double IsoRepeatability(const std::vector<Eigen::Vector3d>& centers) {
-  const auto count = static_cast<double>(centers.size());
-  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-  for (const Eigen::Vector3d& c : centers) mean += c / count;
-  double sum = 0, squares = 0;
-  for (const Eigen::Vector3d& c : centers) sum += (c - mean).norm();
-  for (const Eigen::Vector3d& c : centers) squares += std::pow((c - mean).norm() - sum / count, 2);
-  return sum / count + 3 * std::sqrt(squares / (count - 1));
-}
-
-Result<Envelope> EnvelopeOf(const std::vector<BallPair>& visits) {
-  std::vector<Eigen::Vector3d> first, second, lines;
-  for (const BallPair& pair : visits) {
-    first.push_back(pair[0]);
-    second.push_back(pair[1]);
-    lines.push_back((pair[1] - pair[0]).normalized());
-  }
-  Envelope envelope;
-  ASSIGN_OR_RETURN(const EnclosingBall a, MinimumEnclosingBall(first));
-  ASSIGN_OR_RETURN(const EnclosingBall b, MinimumEnclosingBall(second));
-  ASSIGN_OR_RETURN(const DirectionCone cone, MinimumCone(lines));
-  envelope.first_mm = a.radius;
-  envelope.second_mm = b.radius;
-  envelope.cone_rad = cone.FullAngleRad();
-  envelope.iso_mm = std::max(IsoRepeatability(first), IsoRepeatability(second));
-  return envelope;
-}
 
 std::vector<std::string> Row(const char* what, const Envelope& envelope) {
   return {what, fmt::format("{:.4f}", envelope.first_mm), fmt::format("{:.4f}", envelope.second_mm),
           fmt::format("{:.4f}", envelope.iso_mm), fmt::format("{:.2e}", envelope.cone_rad)};
 }
 
-std::vector<BallPair> Of(const std::vector<Visit>& visits, BallPair Visit::*which) {
+std::vector<BallPair> Of(const std::vector<BallVisit>& visits, BallPair BallVisit::*which) {
   std::vector<BallPair> pairs;
-  for (const Visit& visit : visits) pairs.push_back(visit.*which);
+  for (const BallVisit& visit : visits) pairs.push_back(visit.*which);
   return pairs;
 }
 
 // What is left of the measured centres without the robot.
-std::vector<BallPair> ScannerAlone(const std::vector<Visit>& visits) {
-  const BallPair placed = BallCenters();
+std::vector<BallPair> ScannerAlone(const std::vector<BallVisit>& visits, const BallPair& placed) {
   std::vector<BallPair> pairs;
-  for (const Visit& visit : visits) {
+  for (const BallVisit& visit : visits) {
     pairs.push_back(
-        {placed[0] + visit.measured[0] - visit.robot[0], placed[1] + visit.measured[1] - visit.robot[1]});
+        {placed[0] + visit.taught[0] - visit.robot[0], placed[1] + visit.taught[1] - visit.robot[1]});
   }
   return pairs;
 }
@@ -133,7 +46,7 @@ Result<std::vector<double>> RobotSeries(const CellConfig& config, const Experime
     std::vector<Eigen::Vector3d> centers;
     for (int visit = 0; visit < options.runs; ++visit) {
       centers.push_back(SmallMotion(random, config.robot.position_sd_mm, config.robot.rotation_sd_rad) *
-                        BallCenters()[0]);
+                        PairCenters(config)[0]);
     }
     ASSIGN_OR_RETURN(const EnclosingBall ball, MinimumEnclosingBall(centers));
     radius_mm.push_back(ball.radius);
@@ -142,55 +55,75 @@ Result<std::vector<double>> RobotSeries(const CellConfig& config, const Experime
   return radius_mm;
 }
 
-double DistanceOf(const Visit& visit) { return (visit.measured[1] - visit.measured[0]).norm(); }
-
-// What the calibration alone makes of the distance, here and over many stations of the same care.
-std::string CalibrationRemark(CellConfig config, const std::vector<Visit>& visits) {
-  constexpr int kStations = 500;
-  const double own_mm = DistanceByCalibration(config) - kBallDistanceMm;
-  double rest_mm = 0;
-  for (const Visit& visit : visits) {
-    rest_mm = std::max(rest_mm, std::abs(DistanceOf(visit) - kBallDistanceMm - own_mm));
-  }
-  int within = 0;
-  for (int station = 0; station < kStations; ++station) {
-    config.seed = static_cast<std::uint64_t>(station + 1);
-    within += std::abs(DistanceByCalibration(config) - kBallDistanceMm) <= kDistanceGoalMm ? 1 : 0;
-  }
-  return fmt::format(
-      "Of the distance's error {:+.4f} mm are the written calibration's (truth: its rays, without noise), "
-      "the same at every scan; the rest is {:.4f} mm at most. Of {} calibrations of the cell's care {:.0f} % "
-      "are within {} mm.",
-      own_mm, rest_mm, kStations, 100.0 * within / kStations, kDistanceGoalMm);
+double DistanceOf(const std::array<FittedBall, 2>& balls) {
+  return (balls[1].center - balls[0].center).norm();
 }
 
-Table VisitTable(const std::vector<Visit>& visits, double& worst_mm) {
-  Table table{{"scan", "distance mm", "error mm", "free radius 1 mm", "free radius 2 mm"}, {}};
+double WorstError(const std::vector<BallVisit>& visits, std::array<FittedBall, 2> BallVisit::*which) {
+  double worst_mm = 0;
+  for (const BallVisit& visit : visits) {
+    worst_mm = std::max(worst_mm, std::abs(DistanceOf(visit.*which) - kBallDistanceMm));
+  }
+  return worst_mm;
+}
+
+// What the calibrations alone make of the distance, here and over many stations of the same care.
+std::string CalibrationRemark(const BallStation& station, int stations) {
+  const auto own_mm = [&](const StereoCalibration& calibration) {
+    const BallPair seen = SeenBy(calibration, station.config(), PairCenters(station.config()));
+    return (seen[1] - seen[0]).norm() - kBallDistanceMm;
+  };
+  const BarStations care = RefineStations(station.config(), stations, kDistanceGoalMm);
+  return fmt::format(
+      "The calibration alone makes {:+.4f} mm of the distance's error before refinement and {:+.4f} mm after "
+      "(truth: its rays, without noise), the same at every scan. Of {} calibrations of the cell's care "
+      "{:.0f} % are within {} mm before and {:.0f} % after, {:.0f} % are refused.",
+      own_mm(station.commissioned()), own_mm(station.bar().refinement.calibration), stations,
+      100.0 * care.within_before, kDistanceGoalMm, 100.0 * care.within_after, 100.0 * care.refused);
+}
+
+std::string Signed(double mm) { return fmt::format("{:+.4f}", mm); }
+
+Table VisitTable(const std::vector<BallVisit>& visits) {
+  Table table{{"scan", "error before refinement mm", "distance mm", "error mm", "free radius 1 mm",
+               "free radius 2 mm"},
+              {}};
   for (std::size_t i = 0; i < visits.size(); ++i) {
-    const Visit& visit = visits[i];
-    const double distance_mm = DistanceOf(visit);
-    worst_mm = std::max(worst_mm, std::abs(distance_mm - kBallDistanceMm));
-    table.rows.push_back({fmt::format("{}", i + 1), fmt::format("{:.4f}", distance_mm),
-                          fmt::format("{:+.4f}", distance_mm - kBallDistanceMm),
-                          fmt::format("{:.4f}", visit.radius_mm[0]),
-                          fmt::format("{:.4f}", visit.radius_mm[1])});
+    const BallVisit& visit = visits[i];
+    const double distance_mm = DistanceOf(visit.after);
+    table.rows.push_back({fmt::format("{}", i + 1), Signed(DistanceOf(visit.before) - kBallDistanceMm),
+                          fmt::format("{:.4f}", distance_mm), Signed(distance_mm - kBallDistanceMm),
+                          fmt::format("{:.4f}", visit.after[0].radius_mm),
+                          fmt::format("{:.4f}", visit.after[1].radius_mm)});
   }
   return table;
 }
 
-// Centres about the mean of the measured ones, seen along z of the array.
-Chart CenterChart(const std::vector<Visit>& visits, std::size_t ball) {
+Table BarTable(const CalibrationRefinement& refinement) {
+  Table table{{"placement of the bar", "error before mm", "after mm", "refined without it mm",
+               "its standard deviation mm"},
+              {}};
+  for (const PlacementErrors& placement : refinement.placements) {
+    table.rows.push_back({placement.name, Signed(placement.before_mm), Signed(placement.after_mm),
+                          Signed(placement.left_out_mm), fmt::format("{:.4f}", placement.left_out_sigma_mm)});
+  }
+  return table;
+}
+
+// Centres about the mean of those with standing surfaces, seen along z of the array.
+Chart CenterChart(const std::vector<BallVisit>& visits, std::size_t ball) {
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
   Eigen::Vector3d robot_mean = Eigen::Vector3d::Zero();
-  for (const Visit& visit : visits) {
-    mean += visit.measured[ball] / static_cast<double>(visits.size());
+  for (const BallVisit& visit : visits) {
+    mean += visit.by_standing[ball] / static_cast<double>(visits.size());
     robot_mean += visit.robot[ball] / static_cast<double>(visits.size());
   }
-  Series measured{"measured", Mark::kDots, {}, {}, 0}, robot{"robot alone", Mark::kDots, {}, {}, 3};
+  Series measured{"with standing surfaces", Mark::kDots, {}, {}, 0},
+      robot{"robot alone", Mark::kDots, {}, {}, 3};
   Series circle{"envelope goal, 11 um", Mark::kDashed, {}, {}, 5};
-  for (const Visit& visit : visits) {
-    measured.x.push_back(1000 * (visit.measured[ball] - mean).x());
-    measured.y.push_back(1000 * (visit.measured[ball] - mean).y());
+  for (const BallVisit& visit : visits) {
+    measured.x.push_back(1000 * (visit.by_standing[ball] - mean).x());
+    measured.y.push_back(1000 * (visit.by_standing[ball] - mean).y());
     robot.x.push_back(1000 * (visit.robot[ball] - robot_mean).x());
     robot.y.push_back(1000 * (visit.robot[ball] - robot_mean).y());
   }
@@ -205,37 +138,56 @@ Chart CenterChart(const std::vector<Visit>& visits, std::size_t ball) {
           {}};
 }
 
-Result<std::vector<Visit>> Scan(const CellConfig& config, const ExperimentOptions& options) {
-  ASSIGN_OR_RETURN(StationFiles files, Commission(config, options));
-  ASSIGN_OR_RETURN(Reconstructor reconstructor,
-                   Reconstructor::Create(files.pattern, files.calibration,
-                                         {config.rig.left.width_px, config.rig.left.height_px},
-                                         files.reconstruction.reconstruction));
-  const Bench bench{std::move(files), VirtualCell(config, options.threads), std::move(reconstructor),
-                    BallPart()};
-  std::vector<Visit> visits;
-  for (int number = 0; number < options.runs; ++number) {
-    ASSIGN_OR_RETURN(const Visit visit, Measure(bench, number, options.threads));
-    visits.push_back(visit);
-  }
-  return visits;
-}
-
 struct Shares {
-  Envelope measured, scanner;
+  Envelope by_standing, scanner;
   Table table;
 };
 
-Result<Shares> SharesOf(const std::vector<Visit>& visits) {
+Result<Shares> SharesOf(const std::vector<BallVisit>& visits, const BallPair& placed) {
   Table table{{"", "envelope ball 1 mm", "envelope ball 2 mm", "ISO 9283 RP mm", "cone rad"}, {}};
-  ASSIGN_OR_RETURN(const Envelope measured, EnvelopeOf(Of(visits, &Visit::measured)));
-  ASSIGN_OR_RETURN(const Envelope robot, EnvelopeOf(Of(visits, &Visit::robot)));
-  ASSIGN_OR_RETURN(const Envelope scanner, EnvelopeOf(ScannerAlone(visits)));
-  ASSIGN_OR_RETURN(const Envelope at_rig, EnvelopeOf(Of(visits, &Visit::robot_at_rig)));
-  table.rows = {Row("measured", measured), Row("robot's own share (truth)", robot),
+  ASSIGN_OR_RETURN(const Envelope taught, EnvelopeOf(Of(visits, &BallVisit::taught)));
+  ASSIGN_OR_RETURN(const Envelope by_standing, EnvelopeOf(Of(visits, &BallVisit::by_standing)));
+  ASSIGN_OR_RETURN(const Envelope robot, EnvelopeOf(Of(visits, &BallVisit::robot)));
+  ASSIGN_OR_RETURN(const Envelope scanner, EnvelopeOf(ScannerAlone(visits, placed)));
+  ASSIGN_OR_RETURN(const Envelope at_rig, EnvelopeOf(Of(visits, &BallVisit::robot_at_rig)));
+  table.rows = {Row("measured, robot alone as taught", taught),
+                Row("measured with standing surfaces", by_standing), Row("robot's own share (truth)", robot),
                 Row("scanner's own share", scanner),
                 Row("robot's share, had it scattered about the scanner", at_rig)};
-  return Shares{measured, scanner, table};
+  return Shares{by_standing, scanner, table};
+}
+
+std::string Question(const BallStation& station, int runs) {
+  const RobotScatter& robot = station.config().robot;
+  return fmt::format(
+      "{} scans of two balls {} mm apart, the robot coming anew each time with a scatter of {} mm and {:.1e} "
+      "rad (standard deviation per axis) about the point it looks at. Before, another bar, certified {:.4f} "
+      "mm "
+      "with U = {} mm (truth: {:.4f}), was scanned by hand at {} places, the calibration refined with it "
+      "(forgescan calibration refine) and the view taught anew. Six cold blocks of 30 mm stand about the "
+      "pair; "
+      "one scan without the pair, at another visit, is what each scan's robot error is estimated against, as "
+      "the fusion's standing surfaces do it. Envelope: minimum enclosing ball of a ball's centres, narrowest "
+      "cone about the lines of centres (full apex angle). Truth: where each visit's error of the robot puts "
+      "the centres.",
+      runs, kBallDistanceMm, robot.position_sd_mm, robot.rotation_sd_rad, station.bar().bar.distance_mm,
+      2 * station.bar().bar.distance_sigma_mm, station.bar().true_distance_mm,
+      station.bar().refinement.placements.size());
+}
+
+std::string RefinementRemark(const CalibrationRefinement& refinement) {
+  const auto& placements = refinement.placements;
+  return fmt::format(
+      "Sphere-spacing error of the bar (largest of its placements): {:.4f} mm before, {:.4f} mm after, "
+      "{:.4f} "
+      "mm for placements that were left out. Of {} directions in the calibration's parameters the lengths "
+      "determine {}; columns of the projector then differ by {:.3f} px rms from the cameras' points, {:.3f} "
+      "after it has followed.",
+      LargestError(placements, &PlacementErrors::before_mm),
+      LargestError(placements, &PlacementErrors::after_mm),
+      LargestError(placements, &PlacementErrors::left_out_mm), kRigParameters,
+      refinement.determined_directions, refinement.projector ? refinement.projector->rms_before_px : 0,
+      refinement.projector ? refinement.projector->rms_px : 0);
 }
 
 }  // namespace
@@ -246,33 +198,33 @@ Result<ExperimentReport> RunBalls(const ExperimentOptions& options) {
                 options.runs);
   }
   ASSIGN_OR_RETURN(const CellConfig cell, LoadExperimentCell(options));
-  const CellConfig config = BallCell(cell);
-  ASSIGN_OR_RETURN(const std::vector<Visit> visits, Scan(config, options));
+  ASSIGN_OR_RETURN(const BallStation station, BallStation::Create(cell, options));
+  std::vector<BallVisit> visits;
+  for (int number = 0; number < options.runs; ++number) {
+    ASSIGN_OR_RETURN(const BallVisit visit, station.Scan(number));
+    visits.push_back(visit);
+  }
   ExperimentReport report;
-  report.question = fmt::format(
-      "{} scans of two balls {} mm apart, the robot coming anew each time with a scatter of {} mm and {:.1e} "
-      "rad (standard deviation per axis) about the point it looks at. Envelope: minimum enclosing ball of a "
-      "ball's centres, narrowest cone about the lines of centres (full apex angle). Truth: where each "
-      "visit's error of the robot puts the centres.",
-      options.runs, kBallDistanceMm, config.robot.position_sd_mm, config.robot.rotation_sd_rad);
-  ASSIGN_OR_RETURN(const Shares shares, SharesOf(visits));
-  report.tables.push_back(shares.table);
-  double worst_mm = 0;
-  report.tables.push_back(VisitTable(visits, worst_mm));
+  report.question = Question(station, options.runs);
+  ASSIGN_OR_RETURN(const Shares shares, SharesOf(visits, PairCenters(station.config())));
+  report.tables = {shares.table, VisitTable(visits), BarTable(station.bar().refinement)};
   report.goals = {
-      {"envelope of the centres", std::max(shares.measured.first_mm, shares.measured.second_mm), 0.011, "mm"},
-      {"full cone of the centre lines", shares.measured.cone_rad, 1.55e-4, "rad"},
-      {"distance of the balls, worst error", worst_mm, kDistanceGoalMm, "mm"},
+      {"envelope of the centres, with standing surfaces",
+       std::max(shares.by_standing.first_mm, shares.by_standing.second_mm), 0.011, "mm"},
+      {"full cone of the centre lines, with standing surfaces", shares.by_standing.cone_rad, 1.55e-4, "rad"},
+      {"distance of the balls, worst error", WorstError(visits, &BallVisit::after), kDistanceGoalMm, "mm"},
       {"scanner's own share of the envelope", std::max(shares.scanner.first_mm, shares.scanner.second_mm),
        0.003, "mm"}};
-  ASSIGN_OR_RETURN(const std::vector<double> series, RobotSeries(config, options));
+  ASSIGN_OR_RETURN(const std::vector<double> series, RobotSeries(station.config(), options));
   report.remarks.push_back(fmt::format(
-      "A perfect scanner on this robot finds an envelope of {:.4f} mm in the median of {} series of {} "
-      "scans, and {:.4f} to {:.4f} mm in 90 % of them: whether the goal is met is mostly the luck of the ten "
-      "visits.",
+      "A perfect scanner on this robot, as taught, finds an envelope of {:.4f} mm in the median of {} series "
+      "of {} scans, and {:.4f} to {:.4f} mm in 90 % of them.",
       series[series.size() / 2], kSeries, options.runs, series[series.size() / 20],
       series[series.size() - series.size() / 20]));
-  report.remarks.push_back(CalibrationRemark(config, visits));
+  report.remarks.push_back(fmt::format("Before refinement the worst error of the distance is {:.4f} mm.",
+                                       WorstError(visits, &BallVisit::before)));
+  report.remarks.push_back(RefinementRemark(station.bar().refinement));
+  report.remarks.push_back(CalibrationRemark(station, kStationsARun * options.runs));
   report.svg = SvgFile("balls", 900, 470,
                        DrawChart(CenterChart(visits, 0), {0, 0, 450, 470}) +
                            DrawChart(CenterChart(visits, 1), {450, 0, 450, 470}));

@@ -14,6 +14,9 @@ enum class Draw : std::uint64_t {
   kStart,
   kGapSample,
   kRobotSeries,
+  kBallBar,
+  kBarCertificate,
+  kBarCenters,
 };
 
 inline RandomStream DrawsOf(std::uint64_t seed, Draw use, std::initializer_list<int> key = {}) {

@@ -82,10 +82,27 @@ std::vector<cv::Mat> ExposeAll(const GeometryMap& map, const CellConfig& config,
   return images;
 }
 
+Result<StereoImages> TakeImages(const VirtualCell& cell, const PartState& part, const ViewState& view,
+                                int threads) {
+  StereoImages images;
+  for (const Side side : {Side::kLeft, Side::kRight}) {
+    ASSIGN_OR_RETURN(const GeometryMap map, cell.Map(part, view, side));
+    images[static_cast<std::size_t>(side)] =
+        ExposeAll(map, cell.config(), cell.Patterns(ProjectedSet::kReduced),
+                  {cell.config().seed, view.part, view.view, view.visit, side, 0}, threads);
+  }
+  return images;
+}
+
 Result<VirtualInspection> VirtualInspection::Create(CellConfig config, const ExperimentOptions& options) {
+  ASSIGN_OR_RETURN(StationFiles files, Commission(config, options));
+  return Create(std::move(config), std::move(files), options.threads);
+}
+
+Result<VirtualInspection> VirtualInspection::Create(CellConfig config, StationFiles station, int threads) {
   VirtualInspection inspection;
-  inspection.threads_ = options.threads;
-  ASSIGN_OR_RETURN(inspection.files_, Commission(config, options));
+  inspection.threads_ = threads;
+  inspection.files_ = std::move(station);
   const StationFiles& files = inspection.files_;
   const ImageSize size{config.rig.left.width_px, config.rig.left.height_px};
   ReconstructionConfig reconstruction = files.reconstruction.reconstruction;
@@ -97,7 +114,7 @@ Result<VirtualInspection> VirtualInspection::Create(CellConfig config, const Exp
   inspection.model_ = std::make_shared<const RegistrationModel>(std::move(model));
   ASSIGN_OR_RETURN(auto evaluator, ModelEvaluator::Make(files.model, files.features, files.dimensions));
   inspection.evaluator_ = std::move(evaluator);
-  inspection.cell_ = std::make_shared<const VirtualCell>(std::move(config), options.threads);
+  inspection.cell_ = std::make_shared<const VirtualCell>(std::move(config), threads);
   return inspection;
 }
 

@@ -3,6 +3,7 @@
 // pattern, view matrices, model and settings are read from the files that commissioning wrote.
 #pragma once
 
+#include <array>
 #include <memory>
 #include <opencv2/core/mat.hpp>
 #include <string>
@@ -42,6 +43,11 @@ Result<StationFiles> Commission(const CellConfig& config, const ExperimentOption
 std::vector<cv::Mat> ExposeAll(const GeometryMap& map, const CellConfig& config,
                                const std::vector<Pattern>& patterns, ImageKey key, int threads);
 
+// Both cameras' images of a view, left first.
+using StereoImages = std::array<std::vector<cv::Mat>, 2>;
+Result<StereoImages> TakeImages(const VirtualCell& cell, const PartState& part, const ViewState& view,
+                                int threads);
+
 struct InspectedPart {
   std::vector<MeasuredDimension> dimensions;
   double registration_rms_mm = 0;
@@ -51,6 +57,8 @@ struct InspectedPart {
 class VirtualInspection {
  public:
   static Result<VirtualInspection> Create(CellConfig config, const ExperimentOptions& options);
+  // Of a station that was commissioned, and possibly mended since (bar_refinement.h).
+  static Result<VirtualInspection> Create(CellConfig config, StationFiles files, int threads);
 
   const VirtualCell& cell() const { return *cell_; }
   const CellConfig& config() const { return cell_->config(); }

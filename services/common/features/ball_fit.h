@@ -1,10 +1,16 @@
-// The centre of a ball of the pair in the cloud of a view.
+// The centre of a ball of known radius in the cloud of one view.
 #pragma once
 
 #include "services/common/geometry/point_cloud.h"
 #include "services/common/result.h"
 
 namespace forgescan {
+
+struct BallSearch {
+  Eigen::Vector3d placed;  // where it was put, within 0.4 of the radius
+  Eigen::Vector3d camera;  // where it was seen from
+  double radius_mm = 0;    // as certified
+};
 
 struct FittedBall {
   Eigen::Vector3d center;  // with the known radius
@@ -13,7 +19,6 @@ struct FittedBall {
 
 // From the points within 60 degrees of the direction to the camera, about the centre of a free fit that
 // starts where the ball was put. Frames: all in the cloud's, mm. Errors: those of FitSphere.
-Result<FittedBall> FitBall(const PointCloud& cloud_in_array, const Eigen::Vector3d& placed,
-                           const Eigen::Vector3d& camera_in_array);
+Result<FittedBall> FitBall(const PointCloud& cloud, const BallSearch& ball);
 
 }  // namespace forgescan
