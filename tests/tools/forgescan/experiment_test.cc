@@ -153,7 +153,7 @@ TEST(Experiment, BallsTellScannerFromRobot) {
 }
 
 TEST(Experiment, Table1RepeatsItsSizes) {
-  const ExperimentReport report = RunTwice("fig13-table1", 2);
+  const ExperimentReport report = RunTwice("fig13-table1", 2, 2);
   const Table& table = report.tables.at(1);
   ASSERT_EQ(table.rows.size(), 5u);
   for (std::size_t row = 0; row < 5; ++row) {

@@ -17,11 +17,7 @@ Eigen::Vector3d SeenFrom(const ViewState& view, const CellConfig& config, const 
 
 BallStation::BallStation(const CellConfig& config, int threads, Scanner before, Scanner after,
                          BarRefinement bar)
-    : threads_(threads),
-      cell_(config, threads),
-      before_(std::move(before)),
-      after_(std::move(after)),
-      bar_(std::move(bar)) {}
+    : cell_(config, threads), before_(std::move(before)), after_(std::move(after)), bar_(std::move(bar)) {}
 
 Result<BallStation> BallStation::Create(const CellConfig& cell, const ExperimentOptions& options) {
   const CellConfig config = BallCell(cell);
@@ -39,8 +35,7 @@ Result<BallStation> BallStation::Create(const CellConfig& cell, const Experiment
 Status BallStation::ScanStanding() {
   const PartState nothing = BallPart({});
   ASSIGN_OR_RETURN(const ViewState at_rig, ColdView(cell_, nothing, kVisitWithoutPair));
-  ASSIGN_OR_RETURN(const StereoImages images,
-                   TakeImages(cell_, nothing, ScatterAtTarget(at_rig, config()), threads_));
+  ASSIGN_OR_RETURN(const StereoImages images, TakeImages(cell_, nothing, ScatterAtTarget(at_rig, config())));
   ASSIGN_OR_RETURN(const Reconstruction result, after_.reconstructor.Run(images[0], images[1]));
   standing_ = SurfaceCells(result.cloud_in_camera, VisitErrorOptions().cells);
   return {};
@@ -51,7 +46,7 @@ Result<BallVisit> BallStation::Scan(int visit) const {
   const PartState pair = BallPart(placed);
   ASSIGN_OR_RETURN(const ViewState at_rig, ColdView(cell_, pair, visit));
   const ViewState view = ScatterAtTarget(at_rig, config());
-  ASSIGN_OR_RETURN(const StereoImages images, TakeImages(cell_, pair, view, threads_));
+  ASSIGN_OR_RETURN(const StereoImages images, TakeImages(cell_, pair, view));
   ASSIGN_OR_RETURN(const Reconstruction before, before_.reconstructor.Run(images[0], images[1]));
   ASSIGN_OR_RETURN(const Reconstruction after, after_.reconstructor.Run(images[0], images[1]));
   BallVisit result;

@@ -38,7 +38,6 @@ class BallStation {
   BallStation(const CellConfig& config, int threads, Scanner before, Scanner after, BarRefinement bar);
   Status ScanStanding();
 
-  int threads_;
   VirtualCell cell_;
   Scanner before_, after_;
   BarRefinement bar_;

@@ -79,7 +79,7 @@ Result<BarRefinement> RefineWithBar(const CellConfig& config, const StationFiles
     const int number = static_cast<int>(placements.size());
     const PartState bar = BallPart(placed);
     ASSIGN_OR_RETURN(const ViewState view, ColdView(cell, bar, kFirstBarVisit + number));
-    ASSIGN_OR_RETURN(const StereoImages images, TakeImages(cell, bar, view, threads));
+    ASSIGN_OR_RETURN(const StereoImages images, TakeImages(cell, bar, view));
     ASSIGN_OR_RETURN(const Reconstruction scan, reconstructor.Run(images[0], images[1]));
     ASSIGN_OR_RETURN(const auto balls,
                      FindBalls(scan.cloud_in_camera, placed, station.views.array_from_camera.front()));

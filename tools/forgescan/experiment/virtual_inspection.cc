@@ -82,18 +82,6 @@ std::vector<cv::Mat> ExposeAll(const GeometryMap& map, const CellConfig& config,
   return images;
 }
 
-Result<StereoImages> TakeImages(const VirtualCell& cell, const PartState& part, const ViewState& view,
-                                int threads) {
-  StereoImages images;
-  for (const Side side : {Side::kLeft, Side::kRight}) {
-    ASSIGN_OR_RETURN(const GeometryMap map, cell.Map(part, view, side));
-    images[static_cast<std::size_t>(side)] =
-        ExposeAll(map, cell.config(), cell.Patterns(ProjectedSet::kReduced),
-                  {cell.config().seed, view.part, view.view, view.visit, side, 0}, threads);
-  }
-  return images;
-}
-
 Result<VirtualInspection> VirtualInspection::Create(CellConfig config, const ExperimentOptions& options) {
   ASSIGN_OR_RETURN(StationFiles files, Commission(config, options));
   return Create(std::move(config), std::move(files), options.threads);
@@ -101,7 +89,6 @@ Result<VirtualInspection> VirtualInspection::Create(CellConfig config, const Exp
 
 Result<VirtualInspection> VirtualInspection::Create(CellConfig config, StationFiles station, int threads) {
   VirtualInspection inspection;
-  inspection.threads_ = threads;
   inspection.files_ = std::move(station);
   const StationFiles& files = inspection.files_;
   const ImageSize size{config.rig.left.width_px, config.rig.left.height_px};

@@ -43,11 +43,6 @@ Result<StationFiles> Commission(const CellConfig& config, const ExperimentOption
 std::vector<cv::Mat> ExposeAll(const GeometryMap& map, const CellConfig& config,
                                const std::vector<Pattern>& patterns, ImageKey key, int threads);
 
-// Both cameras' images of a view, left first.
-using StereoImages = std::array<std::vector<cv::Mat>, 2>;
-Result<StereoImages> TakeImages(const VirtualCell& cell, const PartState& part, const ViewState& view,
-                                int threads);
-
 struct InspectedPart {
   std::vector<MeasuredDimension> dimensions;
   double registration_rms_mm = 0;
@@ -84,7 +79,6 @@ class VirtualInspection {
  private:
   VirtualInspection() = default;
 
-  int threads_ = 1;
   StationFiles files_;
   std::shared_ptr<const VirtualCell> cell_;
   std::shared_ptr<const Reconstructor> reconstructor_;

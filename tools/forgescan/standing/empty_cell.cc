@@ -1,7 +1,6 @@
 #include "tools/forgescan/standing/empty_cell.h"
 
 #include <numbers>
-#include <opencv2/core/mat.hpp>
 
 #include "services/common/imaging/stereo_calibration.h"
 #include "services/common/service/station.h"
@@ -61,13 +60,18 @@ Result<std::vector<ViewState>> ViewsWithoutPart(const VirtualCell& cell, const P
 
 }  // namespace
 
-Result<ViewCloud> ScanView(const VirtualCell& cell, const Reconstructor& reconstructor, const PartState& part,
-                           const ViewState& view) {
-  std::array<std::vector<cv::Mat>, 2> images;
+Result<StereoImages> TakeImages(const VirtualCell& cell, const PartState& part, const ViewState& view) {
+  StereoImages images;
   for (const Side side : {Side::kLeft, Side::kRight}) {
     ASSIGN_OR_RETURN(const GeometryMap map, cell.Map(part, view, side));
     images[static_cast<std::size_t>(side)] = Expose(cell, map, view, side);
   }
+  return images;
+}
+
+Result<ViewCloud> ScanView(const VirtualCell& cell, const Reconstructor& reconstructor, const PartState& part,
+                           const ViewState& view) {
+  ASSIGN_OR_RETURN(const StereoImages images, TakeImages(cell, part, view));
   auto result = reconstructor.Run(images[0], images[1]);
   if (!result.ok()) {
     return Fail(result.error().code, "visit {}, view {}: {}", view.visit, view.view, result.error().message);

@@ -2,6 +2,8 @@
 // the station's files as the services read them; nothing of the cell's truth gets into the result.
 #pragma once
 
+#include <array>
+#include <opencv2/core/mat.hpp>
 #include <string>
 #include <vector>
 
@@ -10,6 +12,10 @@
 #include "tools/virtual_station/virtual_cell.h"
 
 namespace forgescan {
+
+// Both cameras' images of a view by the reduced set, left first.
+using StereoImages = std::array<std::vector<cv::Mat>, 2>;
+Result<StereoImages> TakeImages(const VirtualCell& cell, const PartState& part, const ViewState& view);
 
 // Images of both cameras, reconstruction. The view's temperature is what the pyrometer says. Errors: those of
 // the cell and of the reconstruction, naming visit and view.
