@@ -84,8 +84,8 @@ TEST_P(RealLine, InspectsAnAxle) {
   ASSERT_EQ(recordings.size(), 1u);
   EXPECT_TRUE(recordings[0].ends_with("_part000001_" + report["verdict"].get<std::string>() + ".lcmlog"))
       << recordings[0] << " is not the whole part";
-  EXPECT_NEAR(report["registration"]["foreign_share"].get<double>(), 0.22, 0.05)
-      << "the cell should have about 22 % clutter";
+  EXPECT_NEAR(report["registration"]["foreign_share"].get<double>(), 0.31, 0.05)
+      << "of the points 22 % should be clutter as the paper's, and 9 % posts";
 }
 
 // 106496: the kernel makes 212992 of it, the most a plain Debian allows.
