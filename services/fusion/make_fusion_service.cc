@@ -17,8 +17,7 @@ Result<std::optional<VisitCorrection>> LoadCorrection(const Station& station, co
   ASSIGN_OR_RETURN(origin.calibration_crc32, Crc32OfFile(station.calibration));
   ASSIGN_OR_RETURN(StandingSurfaces standing,
                    LoadStandingSurfaces(station.standing, origin, matrices.array_from_camera.size()));
-  return std::optional<VisitCorrection>(std::in_place, std::move(standing), options,
-                                        static_cast<std::size_t>(config.min_standing_cells));
+  return std::optional<VisitCorrection>(std::in_place, std::move(standing), options);
 }
 
 }  // namespace

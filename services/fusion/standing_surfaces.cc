@@ -31,11 +31,26 @@ void Append(const PointCloud& cloud, const Eigen::Isometry3d& moved_from_cloud, 
   moved.sigma_mm.insert(moved.sigma_mm.end(), cloud.sigma_mm.begin(), cloud.sigma_mm.end());
 }
 
+std::vector<SurfaceCell> InRegions(const std::vector<SurfaceCell>& cells,
+                                   const Eigen::Isometry3d& array_from_camera,
+                                   std::span<const Eigen::AlignedBox3d> regions) {
+  std::vector<SurfaceCell> inside;
+  for (const SurfaceCell& cell : cells) {
+    const Eigen::Vector3d p_in_array = array_from_camera * cell.point;
+    const bool counts =
+        std::ranges::any_of(regions, [&](const auto& region) { return region.contains(p_in_array); });
+    if (counts) inside.push_back(cell);
+  }
+  return inside;
+}
+
 // The clouds of one view where the mean of their visits stood.
 Result<PointCloud> Averaged(const std::vector<const PointCloud*>& clouds, int view,
-                            const VisitErrorOptions& options) {
-  const std::vector<SurfaceCell> first = SurfaceCells(*clouds.front(), options.cells);
-  const VisitErrorOptions of_two = AgainstMeanOf(1, options);
+                            const StandingRequest& request) {
+  const std::vector<SurfaceCell> first =
+      InRegions(SurfaceCells(*clouds.front(), request.visit.cells),
+                request.matrices.array_from_camera[static_cast<std::size_t>(view)], request.regions);
+  const VisitErrorOptions of_two = AgainstMeanOf(1, request.visit);
   std::vector<Eigen::Isometry3d> first_from_visit{Eigen::Isometry3d::Identity()};
   for (std::size_t i = 1; i < clouds.size(); ++i) {
     const auto error = EstimateVisitError(first, *clouds[i], of_two);
@@ -51,19 +66,6 @@ Result<PointCloud> Averaged(const std::vector<const PointCloud*>& clouds, int vi
     Append(*clouds[i], mean_from_first * first_from_visit[i], all);
   }
   return all;
-}
-
-std::vector<SurfaceCell> InRegions(const std::vector<SurfaceCell>& cells,
-                                   const Eigen::Isometry3d& array_from_camera,
-                                   std::span<const Eigen::AlignedBox3d> regions) {
-  std::vector<SurfaceCell> inside;
-  for (const SurfaceCell& cell : cells) {
-    const Eigen::Vector3d p_in_array = array_from_camera * cell.point;
-    const bool counts =
-        std::ranges::any_of(regions, [&](const auto& region) { return region.contains(p_in_array); });
-    if (counts) inside.push_back(cell);
-  }
-  return inside;
 }
 
 Status Check(std::span<const std::vector<ViewCloud>> scans, const StandingRequest& request) {
@@ -108,7 +110,7 @@ Result<StandingSurfaces> MakeStandingSurfaces(std::span<const std::vector<ViewCl
       }
     }
     if (clouds.empty()) continue;
-    ASSIGN_OR_RETURN(const PointCloud cloud, Averaged(clouds, static_cast<int>(k), request.visit));
+    ASSIGN_OR_RETURN(const PointCloud cloud, Averaged(clouds, static_cast<int>(k), request));
     standing.views[k] = InRegions(SurfaceCells(cloud, request.visit.cells), matrices[k], request.regions);
     cells += standing.views[k].size();
   }

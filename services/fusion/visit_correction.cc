@@ -12,13 +12,12 @@ Result<VisitErrorOptions> VisitOptionsOf(const FusionConfig& config) {
   options.robot_shift_mm = *config.robot_shift_mm;
   options.robot_turn_rad = *config.robot_turn_rad;
   options.max_sigmas = config.max_robot_sigmas;
+  options.min_cells = static_cast<std::size_t>(config.min_standing_cells);
   return options;
 }
 
-VisitCorrection::VisitCorrection(StandingSurfaces standing, VisitErrorOptions options, std::size_t min_cells)
-    : standing_(std::move(standing)),
-      options_(AgainstMeanOf(standing_.scans, options)),
-      min_cells_(min_cells) {
+VisitCorrection::VisitCorrection(StandingSurfaces standing, const VisitErrorOptions& options)
+    : standing_(std::move(standing)), options_(AgainstMeanOf(standing_.scans, options)) {
   options_.cells.cell_rad = standing_.cell_rad;
 }
 
@@ -30,9 +29,9 @@ Result<CorrectedVisit> VisitCorrection::Of(int view, const PointCloud& cloud_in_
   ASSIGN_OR_RETURN(const VisitError error, EstimateVisitError(cells, cloud_in_camera, options_));
   CorrectedVisit visit;
   visit.cells = error.cells;
-  if (error.cells < min_cells_) {
+  if (error.cells < options_.min_cells) {
     visit.text = fmt::format("only {} cells of what stands still seen, at least {}: not corrected",
-                             error.cells, min_cells_);
+                             error.cells, options_.min_cells);
     return visit;
   }
   visit.corrected = true;

@@ -21,7 +21,7 @@ Result<VisitErrorOptions> VisitOptionsOf(const FusionConfig& config);
 
 class VisitCorrection {
  public:
-  VisitCorrection(StandingSurfaces standing, VisitErrorOptions options, std::size_t min_cells);
+  VisitCorrection(StandingSurfaces standing, const VisitErrorOptions& options);
 
   // Errors: those of EstimateVisitError. Cost: tests/bench/standing_bench.cc.
   Result<CorrectedVisit> Of(int view, const PointCloud& cloud_in_camera) const;
@@ -29,7 +29,6 @@ class VisitCorrection {
  private:
   StandingSurfaces standing_;
   VisitErrorOptions options_;
-  std::size_t min_cells_;
 };
 
 }  // namespace forgescan

@@ -84,12 +84,16 @@ void AddPatch(std::span<const Match> patch, const Vector6& twist, double patch_m
   system.right_side += share * right_side;
 }
 
+Vector6 RobotAlone(const VisitErrorOptions& options) {
+  Vector6 standard;
+  standard << Eigen::Vector3d::Constant(options.robot_shift_mm),
+      Eigen::Vector3d::Constant(options.robot_turn_rad);
+  return standard;
+}
+
 System Build(const std::vector<Match>& matches, const Vector6& twist, const VisitErrorOptions& options) {
   System system;
-  Vector6 prior;
-  prior << Eigen::Vector3d::Constant(options.robot_shift_mm),
-      Eigen::Vector3d::Constant(options.robot_turn_rad);
-  system.information = prior.cwiseAbs2().cwiseInverse().asDiagonal();
+  system.information = RobotAlone(options).cwiseAbs2().cwiseInverse().asDiagonal();
   for (auto begin = matches.begin(); begin != matches.end();) {
     const auto end =
         std::find_if(begin, matches.end(), [&](const Match& match) { return match.patch != begin->patch; });
@@ -107,10 +111,39 @@ Eigen::Isometry3d MotionOf(const Vector6& twist, const Eigen::Vector3d& pivot) {
          Eigen::Translation3d(-pivot);
 }
 
+// How far a patch as a whole lies off where all of them together put it.
+struct PatchResidual {
+  double distance_mm = 0, sigmas = 0;
+};
+
+PatchResidual WorstPatch(const std::vector<Match>& matches, const Vector6& twist,
+                         const VisitErrorOptions& options) {
+  PatchResidual worst;
+  for (auto begin = matches.begin(); begin != matches.end();) {
+    const auto end =
+        std::find_if(begin, matches.end(), [&](const Match& match) { return match.patch != begin->patch; });
+    double sum_mm = 0, weights = 0;
+    for (auto match = begin; match != end; ++match) {
+      sum_mm += (match->distance_mm + match->gradient.dot(twist)) / match->variance_mm2;
+      weights += 1 / match->variance_mm2;
+    }
+    const double distance_mm = std::abs(sum_mm / weights);
+    const double sigma_mm = std::sqrt(1 / weights + options.patch_mm * options.patch_mm);
+    if (distance_mm / sigma_mm > worst.sigmas) worst = {distance_mm, distance_mm / sigma_mm};
+    begin = end;
+  }
+  return worst;
+}
+
 Eigen::Vector3d MiddleOf(const PointCloud& cloud) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  for (const Eigen::Vector3f& p : cloud.points) sum += p.cast<double>();
-  return sum / static_cast<double>(std::max<std::size_t>(1, cloud.size()));
+  std::size_t count = 0;
+  for (const Eigen::Vector3f& p : cloud.points) {
+    if (!p.allFinite()) continue;
+    sum += p.cast<double>();
+    ++count;
+  }
+  return sum / static_cast<double>(std::max<std::size_t>(1, count));
 }
 
 }  // namespace
@@ -119,6 +152,12 @@ Result<VisitError> EstimateVisitError(std::span<const SurfaceCell> standing,
                                       const PointCloud& cloud_in_camera, const VisitErrorOptions& options) {
   const Eigen::Vector3d pivot = MiddleOf(cloud_in_camera);
   const Matches matches = Join(standing, SurfaceCells(cloud_in_camera, options.cells), pivot, options);
+  if (matches.near.size() + matches.far < options.min_cells) {
+    VisitError unknown;
+    unknown.standard = RobotAlone(options);
+    unknown.cells = matches.near.size();
+    return unknown;
+  }
   if (matches.far > matches.near.size()) {
     return Fail(ErrorCode::kUntrusted,
                 "of what stood still {} places are more than {} mm off, {} are not: a knock, or it was moved",
@@ -137,6 +176,14 @@ Result<VisitError> EstimateVisitError(std::span<const SurfaceCell> standing,
                 "the view is {:.3f} mm and {:.0f} urad off where it was taught, more than {} times what the "
                 "robot scatters: a knock, or what stood still was moved",
                 shift_mm, 1e6 * turn_rad, options.max_sigmas);
+  }
+  const PatchResidual worst = WorstPatch(matches.near, twist, options);
+  if (worst.sigmas > options.max_patch_sigmas && worst.distance_mm > options.max_patch_mm) {
+    return Fail(
+        ErrorCode::kUntrusted,
+        "a piece of what stood still lies {:.3f} mm ({:.0f} sigma) off where the rest of it is, at most {} "
+        "mm or {} sigma: it was moved, or grew warm",
+        worst.distance_mm, worst.sigmas, options.max_patch_mm, options.max_patch_sigmas);
   }
   const Matrix6 covariance = InverseOf(Build(matches.near, twist, options).information);
   return VisitError{MotionOf(twist, pivot), twist.head<3>().norm(), covariance.diagonal().cwiseSqrt(),

@@ -49,7 +49,9 @@ void BM_Cells(benchmark::State& state) {
 BENCHMARK(BM_Cells)->Unit(benchmark::kMillisecond);
 
 void BM_VisitError(benchmark::State& state) {
-  const VisitErrorOptions options;
+  VisitErrorOptions options;
+  options.robot_shift_mm = 0.005;
+  options.robot_turn_rad = 0.000024;
   const std::vector<SurfaceCell> standing = Standing(options);
   const PointCloud cloud = MakeView(2);
   for ([[maybe_unused]] const auto& step : state) {

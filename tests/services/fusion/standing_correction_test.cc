@@ -10,11 +10,13 @@
 namespace forgescan {
 namespace {
 
+using testing::AtLeast;
 using testing::Corner;
 using ::testing::HasSubstr;
 using testing::kMiddle;
 using testing::Motion;
 using testing::Moved;
+using testing::Robot;
 
 constexpr std::int64_t kSecondUs = 1'000'000;
 constexpr std::int64_t kViewUtime = 1000;
@@ -30,11 +32,11 @@ class StandingCorrectionTest : public ::testing::Test {
     matrices.array_from_camera.assign(1, Eigen::Isometry3d::Identity());
     const Eigen::AlignedBox3d everywhere(Eigen::Vector3d::Constant(-5000), Eigen::Vector3d::Constant(5000));
     const std::vector<std::vector<ViewCloud>> scans{{{0, 20, Corner(1), {}}}};
-    auto standing = MakeStandingSurfaces(scans, {{}, matrices, {&everywhere, 1}, {}});
+    auto standing = MakeStandingSurfaces(scans, {{}, matrices, {&everywhere, 1}, Robot()});
     service_ = std::make_unique<FusionService>(
         hub_, monitor_, config,
         FusionFiles{matrices, *ExpansionCurve::Create(config.expansion_degc, config.expansion),
-                    VisitCorrection(std::move(*standing), {}, 100)});
+                    VisitCorrection(std::move(*standing), AtLeast(100))});
     listener_.Subscribe<fsmsg::fusion_result_t>(kFusionResult,
                                                 [this](const auto& result) { results_.push_back(result); });
     listener_.Subscribe<fsmsg::cloud_slice_t>(kFusedCloud, [this](const auto& slice) {

@@ -5,10 +5,25 @@
 #include <random>
 
 #include "services/common/geometry/point_cloud.h"
+#include "services/fusion/visit_error.h"
 
 namespace forgescan::testing {
 
 inline constexpr double kNoiseMm = 0.02;
+
+inline VisitErrorOptions Robot() {
+  VisitErrorOptions options;
+  options.robot_shift_mm = 0.005;
+  options.robot_turn_rad = 0.000024;
+  return options;
+}
+
+inline VisitErrorOptions AtLeast(std::size_t cells) {
+  VisitErrorOptions options = Robot();
+  options.min_cells = cells;
+  return options;
+}
+
 inline const Eigen::Vector3d kMiddle(0, 0, 650);  // of what the camera sees
 
 // A square of 100 mm through `center`, a point every 0.6 mm.

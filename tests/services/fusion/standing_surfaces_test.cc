@@ -11,11 +11,14 @@
 namespace forgescan {
 namespace {
 
+using testing::AddSquare;
+using testing::AtLeast;
 using testing::Corner;
 using ::testing::HasSubstr;
 using testing::kMiddle;
 using testing::Motion;
 using testing::Moved;
+using testing::Robot;
 
 const Eigen::AlignedBox3d kEverywhere(Eigen::Vector3d::Constant(-5000), Eigen::Vector3d::Constant(5000));
 
@@ -29,13 +32,31 @@ std::vector<ViewCloud> ScanOf(const PointCloud& cloud, int view = 1) {
   return {{view, std::nan(""), cloud, {}}};
 }
 
+TEST(StandingSurfaces, WhatMovesOutsideTheRegionsIsNoKnock) {
+  const ViewMatrices matrices = TwoViews();
+  const Eigen::AlignedBox3d region(Eigen::Vector3d(-150, -150, -60), Eigen::Vector3d(150, 150, 60));
+  const auto with_belt = [](unsigned seed, double belt_mm) {
+    PointCloud cloud = Corner(seed);
+    std::mt19937 random(seed + 100);
+    for (const double x : {-240.0, 240.0}) {
+      AddSquare(kMiddle + Eigen::Vector3d(x, 0, 200 + belt_mm), Eigen::Vector3d(0, 0, -1), random, cloud);
+    }
+    return cloud;
+  };
+  for (const double belt_mm : {0.05, 0.3}) {
+    const std::vector<std::vector<ViewCloud>> scans{ScanOf(with_belt(1, 0)), ScanOf(with_belt(2, belt_mm))};
+    const auto standing = MakeStandingSurfaces(scans, {{}, matrices, {&region, 1}, Robot()});
+    EXPECT_TRUE(standing.ok()) << standing.error().message;
+  }
+}
+
 TEST(StandingSurfaces, OnlyWhatLiesInARegionCounts) {
   const ViewMatrices matrices = TwoViews();
   // The second square of the corner.
   const Eigen::AlignedBox3d region(Eigen::Vector3d(40, -60, -60), Eigen::Vector3d(150, 60, 60));
   const std::vector<std::vector<ViewCloud>> scans{ScanOf(Corner(1))};
-  const auto all = MakeStandingSurfaces(scans, {{}, matrices, {&kEverywhere, 1}, {}});
-  const auto some = MakeStandingSurfaces(scans, {{}, matrices, {&region, 1}, {}});
+  const auto all = MakeStandingSurfaces(scans, {{}, matrices, {&kEverywhere, 1}, Robot()});
+  const auto some = MakeStandingSurfaces(scans, {{}, matrices, {&region, 1}, Robot()});
   ASSERT_TRUE(all.ok() && some.ok());
   EXPECT_TRUE(all->views.at(0).empty());
   EXPECT_GT(some->views.at(1).size(), 300U);
@@ -56,9 +77,9 @@ TEST(StandingSurfaces, SeveralScansAreAveraged) {
   std::vector<std::vector<ViewCloud>> scans;
   for (unsigned i = 0; i < 2; ++i) scans.push_back(ScanOf(Moved(Corner(10 + i), visits[i].inverse())));
   const auto error_at_middle_mm = [&](std::span<const std::vector<ViewCloud>> of) {
-    const auto standing = MakeStandingSurfaces(of, {{}, matrices, {&kEverywhere, 1}, {}});
+    const auto standing = MakeStandingSurfaces(of, {{}, matrices, {&kEverywhere, 1}, Robot()});
     EXPECT_EQ(standing->scans, static_cast<int>(of.size()));
-    const auto error = EstimateVisitError(standing->views[1], Corner(3), {});
+    const auto error = EstimateVisitError(standing->views[1], Corner(3), Robot());
     return (error->taught_from_actual * kMiddle - kMiddle).norm();
   };
   EXPECT_GT(error_at_middle_mm({scans.data(), 1}), 0.01);  // of the 0.014 mm of that visit
@@ -71,7 +92,7 @@ TEST(StandingSurfaces, RefusesWhatCannotBeAReference) {
   const std::vector<std::vector<ViewCloud>> knocked{
       ScanOf(Corner(1)), ScanOf(Moved(Corner(2), Motion({0.08, 0, 0}, {0, 0, 0})))};
   const Eigen::AlignedBox3d nowhere(Eigen::Vector3d(1000, 0, 0), Eigen::Vector3d(1001, 1, 1));
-  const StandingRequest request{{}, matrices, {&kEverywhere, 1}, {}};
+  const StandingRequest request{{}, matrices, {&kEverywhere, 1}, Robot()};
   EXPECT_THAT(MakeStandingSurfaces({}, request).error().message,
               HasSubstr("at least one scan and one region"));
   EXPECT_THAT(MakeStandingSurfaces(one, {{}, matrices, {}, {}}).error().message,
@@ -82,16 +103,16 @@ TEST(StandingSurfaces, RefusesWhatCannotBeAReference) {
   ASSERT_FALSE(moved.ok());
   EXPECT_EQ(moved.error().code, ErrorCode::kUntrusted);
   EXPECT_THAT(moved.error().message, HasSubstr("view 1: scan 2 against the first: "));
-  EXPECT_THAT(MakeStandingSurfaces(one, {{}, matrices, {&nowhere, 1}, {}}).error().message,
+  EXPECT_THAT(MakeStandingSurfaces(one, {{}, matrices, {&nowhere, 1}, Robot()}).error().message,
               HasSubstr("no surface in any of the 1 regions"));
 }
 
 TEST(VisitCorrection, ReplacesTheRobotsErrorWhereEnoughIsSeen) {
   const ViewMatrices matrices = TwoViews();
   const std::vector<std::vector<ViewCloud>> scans{ScanOf(Corner(1))};
-  const auto standing = MakeStandingSurfaces(scans, {{}, matrices, {&kEverywhere, 1}, {}});
+  const auto standing = MakeStandingSurfaces(scans, {{}, matrices, {&kEverywhere, 1}, Robot()});
   ASSERT_TRUE(standing.ok()) << standing.error().message;
-  const VisitCorrection correction(*standing, {}, 100);
+  const VisitCorrection correction(*standing, AtLeast(100));
   const PointCloud now = Moved(Corner(2), Motion({0.008, 0, 0}, {0, 0, 0}).inverse());
   const auto seen = correction.Of(1, now);
   ASSERT_TRUE(seen.ok()) << seen.error().message;
@@ -105,20 +126,20 @@ TEST(VisitCorrection, ReplacesTheRobotsErrorWhereEnoughIsSeen) {
     EXPECT_TRUE(blind->taught_from_actual.isApprox(Eigen::Isometry3d::Identity(), 0));
     EXPECT_THAT(blind->text, HasSubstr("only 0 cells of what stands still seen, at least 100"));
   }
-  const VisitCorrection strict(*standing, {}, 100'000);
+  const VisitCorrection strict(*standing, AtLeast(100'000));
   EXPECT_FALSE(strict.Of(1, now)->corrected);
   EXPECT_FALSE(correction.Of(1, Moved(Corner(2), Motion({0.08, 0, 0}, {0, 0, 0}))).ok());
 }
 
 // 0.005 mm of the robot and as much of the one scan of the reference: a knock is more than 6 x 0.0071 mm.
 TEST(VisitCorrection, TheReferenceHasAnErrorToo) {
-  EXPECT_NEAR(AgainstMeanOf(1, {}).robot_shift_mm, 0.00707, 1e-5);
-  EXPECT_NEAR(AgainstMeanOf(4, {}).robot_turn_rad / VisitErrorOptions().robot_turn_rad, 1.118, 1e-3);
+  EXPECT_NEAR(AgainstMeanOf(1, Robot()).robot_shift_mm, 0.00707, 1e-5);
+  EXPECT_NEAR(AgainstMeanOf(4, Robot()).robot_turn_rad / Robot().robot_turn_rad, 1.118, 1e-3);
   const ViewMatrices matrices = TwoViews();
   const std::vector<std::vector<ViewCloud>> scans{ScanOf(Corner(1))};
-  const auto standing = MakeStandingSurfaces(scans, {{}, matrices, {&kEverywhere, 1}, {}});
+  const auto standing = MakeStandingSurfaces(scans, {{}, matrices, {&kEverywhere, 1}, Robot()});
   ASSERT_TRUE(standing.ok()) << standing.error().message;
-  const VisitCorrection correction(*standing, {}, 100);
+  const VisitCorrection correction(*standing, AtLeast(100));
   EXPECT_TRUE(correction.Of(1, Moved(Corner(2), Motion({0.036, 0, 0}, {0, 0, 0}).inverse())).ok());
   EXPECT_FALSE(correction.Of(1, Moved(Corner(2), Motion({0.050, 0, 0}, {0, 0, 0}).inverse())).ok());
 }

@@ -20,9 +20,10 @@ using testing::kMiddle;
 using testing::Motion;
 using testing::Moved;
 using testing::Plane;
+using testing::Robot;
 
 Result<VisitError> Estimate(const PointCloud& standing, const PointCloud& now) {
-  const VisitErrorOptions options;
+  const VisitErrorOptions options = Robot();
   return EstimateVisitError(SurfaceCells(standing, options.cells), now, options);
 }
 
@@ -107,7 +108,7 @@ TEST(VisitError, ThePartDoesNotCount) {
 }
 
 TEST(VisitError, CellsWithoutAVarianceDoNotCount) {
-  const VisitErrorOptions options;
+  const VisitErrorOptions options = Robot();
   const auto standing = SurfaceCells(Corner(1), options.cells);
   const PointCloud now = Corner(2);
   const auto whole = EstimateVisitError(standing, now, options);
@@ -131,12 +132,55 @@ TEST(VisitError, CellsWithoutAVarianceDoNotCount) {
 }
 
 TEST(VisitError, AnErrorThatIsNoNumberIsRefused) {
-  const VisitErrorOptions options;
+  const VisitErrorOptions options = Robot();
   auto standing = SurfaceCells(Corner(1), options.cells);
   for (SurfaceCell& cell : standing) cell.point.z() = std::nan("");
   const auto error = EstimateVisitError(standing, Corner(2), options);
   ASSERT_FALSE(error.ok());
   EXPECT_EQ(error.error().code, ErrorCode::kUntrusted);
+}
+
+// A square of its own beside the corner's three.
+PointCloud CornerAndSquare(unsigned seed, double moved_mm) {
+  PointCloud cloud = Corner(seed);
+  std::mt19937 random(seed + 100);
+  AddSquare(kMiddle + Eigen::Vector3d(-110, -80, moved_mm), Eigen::Vector3d(0, 0, -1), random, cloud);
+  return cloud;
+}
+
+TEST(VisitError, APieceThatMovedByItselfIsNamed) {
+  EXPECT_TRUE(Estimate(CornerAndSquare(1, 0), CornerAndSquare(2, 0.002)).ok());  // mm: it would not matter
+  const auto error = Estimate(CornerAndSquare(1, 0), CornerAndSquare(2, 0.03));
+  ASSERT_FALSE(error.ok());
+  EXPECT_EQ(error.error().code, ErrorCode::kUntrusted);
+  EXPECT_THAT(error.error().message, HasSubstr("a piece of what stood still lies"));
+}
+
+TEST(VisitError, OfFewPlacesNothingIsSaid) {
+  std::mt19937 random(1);
+  PointCloud standing, now;
+  AddSquare(kMiddle, Eigen::Vector3d(0, 0, -1), random, standing);
+  AddSquare(kMiddle - Eigen::Vector3d(0, 0, 2), Eigen::Vector3d(0, 0, -1), random, now);  // before all of it
+  VisitErrorOptions options = Robot();
+  const auto cells = SurfaceCells(standing, options.cells);
+  EXPECT_FALSE(EstimateVisitError(cells, now, options).ok());
+  options.min_cells = cells.size() + 1;
+  const auto error = EstimateVisitError(cells, now, options);
+  ASSERT_TRUE(error.ok()) << error.error().message;
+  EXPECT_EQ(error->cells, 0U);
+  EXPECT_EQ(error->standard[0], options.robot_shift_mm);
+  EXPECT_TRUE(error->taught_from_actual.isApprox(Eigen::Isometry3d::Identity(), 1e-12));
+}
+
+TEST(VisitError, APointThatIsNoPlaceChangesNothing) {
+  PointCloud now = Corner(2);
+  const auto without = Estimate(Corner(1), now);
+  now.points.emplace_back(std::nanf(""), 0.F, 650.F);
+  now.normals.emplace_back(0.F, 0.F, -1.F);
+  now.sigma_mm.push_back(0.02F);
+  const auto with = Estimate(Corner(1), now);
+  ASSERT_TRUE(without.ok() && with.ok());
+  EXPECT_TRUE(with->taught_from_actual.isApprox(without->taught_from_actual, 0));
 }
 
 TEST(VisitError, AKnockIsNotCorrected) {

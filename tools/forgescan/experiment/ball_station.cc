@@ -37,7 +37,9 @@ Status BallStation::ScanStanding() {
   ASSIGN_OR_RETURN(const ViewState at_rig, ColdView(cell_, nothing, kVisitWithoutPair));
   ASSIGN_OR_RETURN(const StereoImages images, TakeImages(cell_, nothing, ScatterAtTarget(at_rig, config())));
   ASSIGN_OR_RETURN(const Reconstruction result, after_.reconstructor.Run(images[0], images[1]));
-  standing_ = SurfaceCells(result.cloud_in_camera, VisitErrorOptions().cells);
+  ASSIGN_OR_RETURN(const VisitErrorOptions visit, VisitOptionsOf(after_.files.fusion));
+  visit_ = AgainstMeanOf(1, visit);
+  standing_ = SurfaceCells(result.cloud_in_camera, visit_.cells);
   return {};
 }
 
@@ -54,8 +56,7 @@ Result<BallVisit> BallStation::Scan(int visit) const {
                    FindBalls(before.cloud_in_camera, placed, before_.files.views.array_from_camera.front()));
   const Eigen::Isometry3d& array_from_camera = after_.files.views.array_from_camera.front();
   ASSIGN_OR_RETURN(result.after, FindBalls(after.cloud_in_camera, placed, array_from_camera));
-  ASSIGN_OR_RETURN(const VisitError error,
-                   EstimateVisitError(standing_, after.cloud_in_camera, VisitErrorOptions()));
+  ASSIGN_OR_RETURN(const VisitError error, EstimateVisitError(standing_, after.cloud_in_camera, visit_));
   for (std::size_t i = 0; i < 2; ++i) {
     result.taught[i] = array_from_camera * result.after[i].center;
     result.by_standing[i] = array_from_camera * (error.taught_from_actual * result.after[i].center);

@@ -42,6 +42,7 @@ class BallStation {
   Scanner before_, after_;
   BarRefinement bar_;
   std::vector<SurfaceCell> standing_;
+  VisitErrorOptions visit_;
 };
 
 }  // namespace forgescan

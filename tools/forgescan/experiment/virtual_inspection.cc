@@ -130,10 +130,7 @@ Result<InspectedPart> VirtualInspection::Measure(const std::vector<ViewCloud>& v
 
 Result<VisitCorrection> VirtualInspection::Correction(const PartState& part,
                                                       const std::vector<ViewState>& views) const {
-  const RobotScatter& robot = config().robot;
-  VisitErrorOptions visit;
-  visit.robot_shift_mm = robot.position_sd_mm;
-  visit.robot_turn_rad = robot.rotation_sd_rad;
+  ASSIGN_OR_RETURN(VisitErrorOptions visit, VisitOptionsOf(files_.fusion));
   visit.cells.cell_rad =
       CellRadOf(files_.calibration.left.camera_matrix(0, 0), files_.reconstruction.publish_every_nth_point);
   std::vector<std::vector<ViewCloud>> scans(1);
@@ -141,8 +138,7 @@ Result<VisitCorrection> VirtualInspection::Correction(const PartState& part,
   const auto regions = PostRegions(config().posts);
   ASSIGN_OR_RETURN(StandingSurfaces standing,
                    MakeStandingSurfaces(scans, {{}, files_.views, regions, visit}));
-  return VisitCorrection(std::move(standing), visit,
-                         static_cast<std::size_t>(files_.fusion.min_standing_cells));
+  return VisitCorrection(std::move(standing), visit);
 }
 
 ViewState ScatterAtTarget(const ViewState& view, const CellConfig& config) {

@@ -72,8 +72,7 @@ class VirtualInspection {
 
   const ViewMatrices& matrices() const { return files_.views; }
 
-  // By the posts, as one scan of the cell without the part shows them in these views. The robot's standard
-  // deviations are the cell's, as a station's are measured.
+  // By the posts, as one scan of the cell without the part shows them in these views.
   Result<VisitCorrection> Correction(const PartState& part, const std::vector<ViewState>& views) const;
 
  private:
