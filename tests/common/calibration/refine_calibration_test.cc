@@ -177,3 +177,16 @@ TEST(RefineCalibration, WrongInputIsNamedAndTheNextWorks) {
 
 }  // namespace
 }  // namespace forgescan
+TEST(RefineCalibration, OnePlaceMeasuredTwiceIsRefused) {
+  std::vector<BarPlacement> placements = MeasuredBar(Written(), kBarMm, 0.001);
+  BarPlacement repeat = placements[4];
+  repeat.name = "again";
+  std::swap(repeat.center_in_camera[0], repeat.center_in_camera[1]);
+  for (Eigen::Vector3d& center : repeat.center_in_camera) center.z() += 15;
+  placements.push_back(repeat);
+  EXPECT_THAT(Refusal(placements, BarOptions(), ErrorCode::kDegenerate),
+              HasSubstr("placements P5 and again are one place"));
+  std::swap(placements.back().center_in_camera[0], placements.back().center_in_camera[1]);
+  EXPECT_THAT(Refusal(placements, BarOptions(), ErrorCode::kDegenerate), HasSubstr("are one place"));
+}
+
