@@ -109,8 +109,6 @@ std::string JsonText(const CalibrationRefinement& refinement) {
 
 Status Refine(const Arguments& arguments) {
   ASSIGN_OR_RETURN(PlacementsFile file, ReadPlacementsFile(arguments.placements));
-  ASSIGN_OR_RETURN(auto outputs,
-                   OutputFiles::Create(PathsOf(arguments, file), {arguments.out, arguments.json}));
   ASSIGN_OR_RETURN(const Inputs inputs, ReadInputs(arguments, std::move(file)));
   ASSIGN_OR_RETURN(
       const CalibrationRefinement refinement,
@@ -124,6 +122,9 @@ Status Refine(const Arguments& arguments) {
   PrintPlacements(refinement);
   PrintParameters(refinement, inputs.file.options.prior);
   return {};
+  // It removes what an earlier call wrote: not before there is something better.
+  ASSIGN_OR_RETURN(auto outputs,
+                   OutputFiles::Create(PathsOf(arguments, inputs.file), {arguments.out, arguments.json}));
 }
 
 Status CheckLengths(const Arguments& arguments) {

@@ -88,6 +88,31 @@ TEST_F(CalibrationCli, NeverWritesOverWhatItReads) {
   const std::string before = ReadInputFile(folder_ / "stereo.yaml").value();
   const CommandOutput output =
       Call("refine --calibration stereo.yaml --placements bar.toml --out ./stereo.yaml");
+TEST_F(CalibrationCli, ARefusalLeavesWhatAnEarlierCallWrote) {
+  ASSERT_EQ(Refine().exit_code, 0);
+  const std::string yaml = ReadInputFile(folder_ / "new.yaml").value();
+  const std::string json = ReadInputFile(folder_ / "new.json").value();
+  std::vector<BarPlacement> placements = MeasuredBar(written_, kBarMm, 0.002);
+  placements[3].center_in_camera[0].x() += 0.1;
+  Write("bar.toml", PlacementsText(placements, kBarMm));
+  ASSERT_EQ(Refine().exit_code, 1);
+  ASSERT_TRUE(fs::exists(folder_ / "new.yaml") && fs::exists(folder_ / "new.json"));
+  EXPECT_EQ(ReadInputFile(folder_ / "new.yaml").value(), yaml);
+  EXPECT_EQ(ReadInputFile(folder_ / "new.json").value(), json);
+}
+
+TEST_F(CalibrationCli, RepeatsOfOnePlaceAreRefused) {
+  std::vector<BarPlacement> placements = MeasuredBar(written_, kBarMm, 0.002);
+  placements.push_back(placements[2]);
+  placements.back().name = "again";
+  Write("bar.toml", PlacementsText(placements, kBarMm));
+  for (const CommandOutput& output :
+       {Refine(), Call("check --calibration stereo.yaml --placements bar.toml --max-error-mm 0.2")}) {
+    EXPECT_EQ(output.exit_code, 1);
+    EXPECT_THAT(output.text, HasSubstr("placements P3 and again are one place"));
+  }
+}
+
   EXPECT_EQ(output.exit_code, 1) << output.text;
   EXPECT_EQ(ReadInputFile(folder_ / "stereo.yaml").value(), before);
 }
