@@ -72,6 +72,9 @@ void PrintParameters(const CalibrationRefinement& refinement, const CalibrationP
     std::printf("%-16s %+10.3g %10.3g                %10.3g %s\n", parameter.name, refinement.correction(i),
                 before(i), refinement.posterior_sigma(i), parameter.unit);
   }
+  const CertificateCorrection& certificate = refinement.certificate;
+  std::printf("%-16s %+10.3g %10.3g                %10.3g mm\n", "certified length", certificate.correction_mm,
+              certificate.prior_sigma_mm, certificate.sigma_mm);
   std::printf("directions the lengths determine: %d of %d\n", refinement.determined_directions,
               kRigParameters);
   if (refinement.projector) {
@@ -87,7 +90,8 @@ std::string JsonText(const CalibrationRefinement& refinement) {
                           {"before_mm", placement.before_mm},
                           {"after_mm", placement.after_mm},
                           {"left_out_mm", placement.left_out_mm},
-                          {"left_out_sigma_mm", placement.left_out_sigma_mm}});
+                          {"left_out_sigma_mm", placement.left_out_sigma_mm},
+                          {"misfit_sigmas", placement.misfit_sigmas}});
   }
   for (int i = 0; i < kRigParameters; ++i) {
     const RigParameter& parameter = RigParameters().at(static_cast<std::size_t>(i));
@@ -100,7 +104,12 @@ std::string JsonText(const CalibrationRefinement& refinement) {
                           {"covariance", covariance}});
   }
   for (int i = 0; i < 16; ++i) motion.push_back(refinement.refined_from_present.matrix()(i / 4, i % 4));
+  const CertificateCorrection& certificate = refinement.certificate;
   const Json json = {{"placements", placements},
+                     {"certificate",
+                      {{"correction_mm", certificate.correction_mm},
+                       {"prior_sigma_mm", certificate.prior_sigma_mm},
+                       {"sigma_mm", certificate.sigma_mm}}},
                      {"parameters", parameters},
                      {"determined_directions", refinement.determined_directions},
                      {"refined_from_present", motion}};
@@ -113,6 +122,9 @@ Status Refine(const Arguments& arguments) {
   ASSIGN_OR_RETURN(
       const CalibrationRefinement refinement,
       RefineCalibration(inputs.calibration, inputs.file.bar, inputs.placements, inputs.file.options));
+  // It removes what an earlier call wrote: not before there is something better.
+  ASSIGN_OR_RETURN(auto outputs,
+                   OutputFiles::Create(PathsOf(arguments, inputs.file), {arguments.out, arguments.json}));
   RETURN_IF_ERROR(
       WriteOutputFile(outputs.Staged(arguments.out), StereoCalibrationText(refinement.calibration)));
   if (!arguments.json.empty()) {
@@ -122,9 +134,6 @@ Status Refine(const Arguments& arguments) {
   PrintPlacements(refinement);
   PrintParameters(refinement, inputs.file.options.prior);
   return {};
-  // It removes what an earlier call wrote: not before there is something better.
-  ASSIGN_OR_RETURN(auto outputs,
-                   OutputFiles::Create(PathsOf(arguments, inputs.file), {arguments.out, arguments.json}));
 }
 
 Status CheckLengths(const Arguments& arguments) {

@@ -55,6 +55,10 @@ TEST_F(CalibrationCli, RefinesAndPrintsWhatItDid) {
   const double correction = json["parameters"][0]["correction"];
   EXPECT_NEAR(refined->left.camera_matrix(0, 0), written_.left.camera_matrix(0, 0) + correction, 1e-9);
   EXPECT_NE(correction, 0);
+  EXPECT_THAT(output.text, HasSubstr("certified length"));
+  EXPECT_EQ(json["certificate"]["prior_sigma_mm"], 0.0005);
+  EXPECT_LE(json["certificate"]["sigma_mm"], 0.0005);
+  EXPECT_NE(json["certificate"]["correction_mm"], 0);
 }
 
 TEST_F(CalibrationCli, WritesWhatItReads) {
@@ -84,10 +88,6 @@ TEST_F(CalibrationCli, ARefusalLeavesNoFile) {
   EXPECT_EQ(Refine().exit_code, 0);
 }
 
-TEST_F(CalibrationCli, NeverWritesOverWhatItReads) {
-  const std::string before = ReadInputFile(folder_ / "stereo.yaml").value();
-  const CommandOutput output =
-      Call("refine --calibration stereo.yaml --placements bar.toml --out ./stereo.yaml");
 TEST_F(CalibrationCli, ARefusalLeavesWhatAnEarlierCallWrote) {
   ASSERT_EQ(Refine().exit_code, 0);
   const std::string yaml = ReadInputFile(folder_ / "new.yaml").value();
@@ -113,6 +113,10 @@ TEST_F(CalibrationCli, RepeatsOfOnePlaceAreRefused) {
   }
 }
 
+TEST_F(CalibrationCli, NeverWritesOverWhatItReads) {
+  const std::string before = ReadInputFile(folder_ / "stereo.yaml").value();
+  const CommandOutput output =
+      Call("refine --calibration stereo.yaml --placements bar.toml --out ./stereo.yaml");
   EXPECT_EQ(output.exit_code, 1) << output.text;
   EXPECT_EQ(ReadInputFile(folder_ / "stereo.yaml").value(), before);
 }
