@@ -7,6 +7,7 @@
 #include "services/common/imaging/stereo_calibration_text.h"
 #include "services/common/input_file.h"
 #include "services/common/output_file.h"
+#include "services/fusion/standing_file.h"
 #include "tools/finite_range.h"
 #include "tools/forgescan/command.h"
 #include "tools/forgescan/output_files.h"
@@ -44,9 +45,20 @@ std::vector<fs::path> PathsOf(const Arguments& arguments, const PlacementsFile& 
   return paths;
 }
 
+// Points of another calibration are off by both calibrations' errors, and nothing in them shows it.
+Status CheckOrigin(const Arguments& arguments, const PlacementsFile& file) {
+  if (!file.calibration_crc32) return {};
+  ASSIGN_OR_RETURN(const std::uint32_t crc, Crc32OfFile(arguments.calibration));
+  if (crc == *file.calibration_crc32) return {};
+  return Fail(ErrorCode::kInvalidArgument,
+              "{}: the placements were measured with the calibration of calibration_crc32 {}, {} has {}",
+              arguments.placements, *file.calibration_crc32, arguments.calibration, crc);
+}
+
 Result<Inputs> ReadInputs(const Arguments& arguments, PlacementsFile file) {
   Inputs inputs;
   ASSIGN_OR_RETURN(inputs.calibration, LoadStereoCalibration(arguments.calibration));
+  RETURN_IF_ERROR(CheckOrigin(arguments, file));
   inputs.file = std::move(file);
   ASSIGN_OR_RETURN(inputs.placements, MeasurePlacements(inputs.file));
   return inputs;

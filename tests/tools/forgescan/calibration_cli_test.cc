@@ -8,6 +8,7 @@
 
 #include "services/common/imaging/stereo_calibration_text.h"
 #include "services/common/input_file.h"
+#include "services/fusion/standing_file.h"
 #include "tests/common/calibration/bar_scene.h"
 #include "tests/run_command.h"
 
@@ -99,6 +100,22 @@ TEST_F(CalibrationCli, ARefusalLeavesWhatAnEarlierCallWrote) {
   ASSERT_TRUE(fs::exists(folder_ / "new.yaml") && fs::exists(folder_ / "new.json"));
   EXPECT_EQ(ReadInputFile(folder_ / "new.yaml").value(), yaml);
   EXPECT_EQ(ReadInputFile(folder_ / "new.json").value(), json);
+}
+
+TEST_F(CalibrationCli, PointsOfAnotherCalibrationAreRefused) {
+  const std::string text = PlacementsText(MeasuredBar(written_, kBarMm, 0.002), kBarMm);
+  Write("bar.toml", fmt::format("calibration_crc32 = {}\n{}", *Crc32OfFile(folder_ / "stereo.yaml"), text));
+  const CommandOutput good = Refine();
+  EXPECT_EQ(good.exit_code, 0) << good.text;
+  const CommandOutput check =
+      Call("check --calibration new.yaml --placements bar.toml --max-error-mm 0.2");
+  EXPECT_EQ(check.exit_code, 1);
+  EXPECT_THAT(check.text, HasSubstr(fmt::format("new.yaml has {}", *Crc32OfFile(folder_ / "new.yaml"))));
+  Write("bar.toml", "calibration_crc32 = 7\n" + text);
+  const CommandOutput other = Refine();
+  EXPECT_EQ(other.exit_code, 1);
+  EXPECT_THAT(other.text, HasSubstr("bar.toml: the placements were measured with the calibration of "
+                                    "calibration_crc32 7, stereo.yaml has"));
 }
 
 TEST_F(CalibrationCli, RepeatsOfOnePlaceAreRefused) {
