@@ -85,8 +85,8 @@ void PrintParameters(const CalibrationRefinement& refinement, const CalibrationP
                 before(i), refinement.posterior_sigma(i), parameter.unit);
   }
   const CertificateCorrection& certificate = refinement.certificate;
-  std::printf("%-16s %+10.3g %10.3g                %10.3g mm\n", "certified length", certificate.correction_mm,
-              certificate.prior_sigma_mm, certificate.sigma_mm);
+  std::printf("%-16s %+10.3g %10.3g                %10.3g mm\n", "certified length",
+              certificate.correction_mm, certificate.prior_sigma_mm, certificate.sigma_mm);
   std::printf("directions the lengths determine: %d of %d\n", refinement.determined_directions,
               kRigParameters);
   if (refinement.projector) {

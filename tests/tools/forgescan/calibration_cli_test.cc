@@ -107,8 +107,7 @@ TEST_F(CalibrationCli, PointsOfAnotherCalibrationAreRefused) {
   Write("bar.toml", fmt::format("calibration_crc32 = {}\n{}", *Crc32OfFile(folder_ / "stereo.yaml"), text));
   const CommandOutput good = Refine();
   EXPECT_EQ(good.exit_code, 0) << good.text;
-  const CommandOutput check =
-      Call("check --calibration new.yaml --placements bar.toml --max-error-mm 0.2");
+  const CommandOutput check = Call("check --calibration new.yaml --placements bar.toml --max-error-mm 0.2");
   EXPECT_EQ(check.exit_code, 1);
   EXPECT_THAT(check.text, HasSubstr(fmt::format("new.yaml has {}", *Crc32OfFile(folder_ / "new.yaml"))));
   Write("bar.toml", "calibration_crc32 = 7\n" + text);

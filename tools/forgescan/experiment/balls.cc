@@ -171,9 +171,9 @@ std::string Question(const BallStation& station, int runs) {
       "the fusion's standing surfaces do it. Envelope: minimum enclosing ball of a ball's centres, narrowest "
       "cone about the lines of centres (full apex angle). Truth: where each visit's error of the robot puts "
       "the centres.",
-      runs, kBallDistanceMm, robot.position_sd_mm, robot.rotation_sd_rad, station.bar().certified.bar.distance_mm,
-      2 * station.bar().certified.bar.distance_sigma_mm, station.bar().certified.true_distance_mm,
-      station.bar().refinement.placements.size());
+      runs, kBallDistanceMm, robot.position_sd_mm, robot.rotation_sd_rad,
+      station.bar().certified.bar.distance_mm, 2 * station.bar().certified.bar.distance_sigma_mm,
+      station.bar().certified.true_distance_mm, station.bar().refinement.placements.size());
 }
 
 std::string RefinementRemark(const CalibrationRefinement& refinement) {

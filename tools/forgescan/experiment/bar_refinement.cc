@@ -85,9 +85,8 @@ Result<BarRefinement> RefineWithBar(const CellConfig& config, const StationFiles
     ASSIGN_OR_RETURN(const Reconstruction scan, reconstructor.Run(images[0], images[1]));
     ASSIGN_OR_RETURN(const auto balls,
                      FindBalls(scan.cloud_in_camera, placed, station.views.array_from_camera.front()));
-    placements.push_back({fmt::format("{}", number + 1),
-                          {balls[0].center, balls[1].center},
-                          CenterSigmaMm(config)});
+    placements.push_back(
+        {fmt::format("{}", number + 1), {balls[0].center, balls[1].center}, CenterSigmaMm(config)});
   }
   ASSIGN_OR_RETURN(result.refinement, RefineCalibration(station.calibration, result.certified.bar, placements,
                                                         BarRefinementOptions(config)));

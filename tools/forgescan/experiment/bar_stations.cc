@@ -37,9 +37,8 @@ BarStations RefineStations(CellConfig config, int stations, double limit_mm) {
     const StereoCalibration calibration = CalibrationOf(CalibratedRig(config));
     CertifiedBar certified = Certified(config);
     certified.bar.ball_radius_mm = 0;  // rays show centres, not surfaces
-    const auto refinement =
-        RefineCalibration(calibration, certified.bar,
-                          MeasureBar(calibration, config, certified.true_distance_mm), options);
+    const auto refinement = RefineCalibration(
+        calibration, certified.bar, MeasureBar(calibration, config, certified.true_distance_mm), options);
     result.within_before += ErrorOf(calibration, config) <= limit_mm ? 1.0 / stations : 0;
     if (!refinement.ok()) {
       result.refused += 1.0 / stations;

@@ -13,8 +13,8 @@ struct BarStations {
 };
 
 // Stations 1, 2, ... are the cell with these seeds: their calibrations, bars with their certificates' errors,
-// placements and errors of centres, computed by rays without images. The calibrations err in the 16 parameters
-// that are refined, and the projector; p1, p2 and what else a lens has are right.
+// placements and errors of centres, computed by rays without images. The calibrations err in the 16
+// parameters that are refined, and the projector; p1, p2 and what else a lens has are right.
 BarStations RefineStations(CellConfig config, int stations, double limit_mm);
 
 }  // namespace forgescan
