@@ -143,6 +143,7 @@ constexpr char kPlacements[] = R"(distance_mm = 125.0123
 expanded_uncertainty_mm = 0.001
 ball_radius_mm = 19.05
 volume_mm = [240, 240, 160]
+calibration_crc32 = 4294967295
 [prior]
 focal_px = 0.3
 [[placement]]

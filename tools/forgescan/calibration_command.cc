@@ -7,6 +7,7 @@
 #include "services/common/imaging/stereo_calibration_text.h"
 #include "services/common/input_file.h"
 #include "services/common/output_file.h"
+#include "services/fusion/standing_file.h"
 #include "tools/finite_range.h"
 #include "tools/forgescan/command.h"
 #include "tools/forgescan/output_files.h"
@@ -44,9 +45,20 @@ std::vector<fs::path> PathsOf(const Arguments& arguments, const PlacementsFile& 
   return paths;
 }
 
+// Points of another calibration are off by both calibrations' errors, and nothing in them shows it.
+Status CheckOrigin(const Arguments& arguments, const PlacementsFile& file) {
+  if (!file.calibration_crc32) return {};
+  ASSIGN_OR_RETURN(const std::uint32_t crc, Crc32OfFile(arguments.calibration));
+  if (crc == *file.calibration_crc32) return {};
+  return Fail(ErrorCode::kInvalidArgument,
+              "{}: the placements were measured with the calibration of calibration_crc32 {}, {} has {}",
+              arguments.placements, *file.calibration_crc32, arguments.calibration, crc);
+}
+
 Result<Inputs> ReadInputs(const Arguments& arguments, PlacementsFile file) {
   Inputs inputs;
   ASSIGN_OR_RETURN(inputs.calibration, LoadStereoCalibration(arguments.calibration));
+  RETURN_IF_ERROR(CheckOrigin(arguments, file));
   inputs.file = std::move(file);
   ASSIGN_OR_RETURN(inputs.placements, MeasurePlacements(inputs.file));
   return inputs;
@@ -72,6 +84,9 @@ void PrintParameters(const CalibrationRefinement& refinement, const CalibrationP
     std::printf("%-16s %+10.3g %10.3g                %10.3g %s\n", parameter.name, refinement.correction(i),
                 before(i), refinement.posterior_sigma(i), parameter.unit);
   }
+  const CertificateCorrection& certificate = refinement.certificate;
+  std::printf("%-16s %+10.3g %10.3g                %10.3g mm\n", "certified length",
+              certificate.correction_mm, certificate.prior_sigma_mm, certificate.sigma_mm);
   std::printf("directions the lengths determine: %d of %d\n", refinement.determined_directions,
               kRigParameters);
   if (refinement.projector) {
@@ -87,7 +102,8 @@ std::string JsonText(const CalibrationRefinement& refinement) {
                           {"before_mm", placement.before_mm},
                           {"after_mm", placement.after_mm},
                           {"left_out_mm", placement.left_out_mm},
-                          {"left_out_sigma_mm", placement.left_out_sigma_mm}});
+                          {"left_out_sigma_mm", placement.left_out_sigma_mm},
+                          {"misfit_sigmas", placement.misfit_sigmas}});
   }
   for (int i = 0; i < kRigParameters; ++i) {
     const RigParameter& parameter = RigParameters().at(static_cast<std::size_t>(i));
@@ -100,7 +116,12 @@ std::string JsonText(const CalibrationRefinement& refinement) {
                           {"covariance", covariance}});
   }
   for (int i = 0; i < 16; ++i) motion.push_back(refinement.refined_from_present.matrix()(i / 4, i % 4));
+  const CertificateCorrection& certificate = refinement.certificate;
   const Json json = {{"placements", placements},
+                     {"certificate",
+                      {{"correction_mm", certificate.correction_mm},
+                       {"prior_sigma_mm", certificate.prior_sigma_mm},
+                       {"sigma_mm", certificate.sigma_mm}}},
                      {"parameters", parameters},
                      {"determined_directions", refinement.determined_directions},
                      {"refined_from_present", motion}};
@@ -109,12 +130,13 @@ std::string JsonText(const CalibrationRefinement& refinement) {
 
 Status Refine(const Arguments& arguments) {
   ASSIGN_OR_RETURN(PlacementsFile file, ReadPlacementsFile(arguments.placements));
-  ASSIGN_OR_RETURN(auto outputs,
-                   OutputFiles::Create(PathsOf(arguments, file), {arguments.out, arguments.json}));
   ASSIGN_OR_RETURN(const Inputs inputs, ReadInputs(arguments, std::move(file)));
   ASSIGN_OR_RETURN(
       const CalibrationRefinement refinement,
       RefineCalibration(inputs.calibration, inputs.file.bar, inputs.placements, inputs.file.options));
+  // It removes what an earlier call wrote: not before there is something better.
+  ASSIGN_OR_RETURN(auto outputs,
+                   OutputFiles::Create(PathsOf(arguments, inputs.file), {arguments.out, arguments.json}));
   RETURN_IF_ERROR(
       WriteOutputFile(outputs.Staged(arguments.out), StereoCalibrationText(refinement.calibration)));
   if (!arguments.json.empty()) {

@@ -68,6 +68,28 @@ Status CheckPlacement(const BarPlacement& placement, const BallBar& bar, const R
   return {};
 }
 
+// How far the ball that moved more moved, whichever ball is called the first.
+double MoveMm(const BarPlacement& from, const BarPlacement& to) {
+  const auto& [a, b] = from.center_in_camera;
+  const auto& [c, d] = to.center_in_camera;
+  return std::min(std::max((c - a).norm(), (d - b).norm()), std::max((d - a).norm(), (c - b).norm()));
+}
+
+// A place measured twice would vouch for itself when it is left out.
+Status CheckPlaces(std::span<const BarPlacement> placements, double min_move_mm) {
+  for (std::size_t i = 0; i < placements.size(); ++i) {
+    for (std::size_t j = i + 1; j < placements.size(); ++j) {
+      const double move_mm = MoveMm(placements[i], placements[j]);
+      if (move_mm >= min_move_mm) continue;
+      return Fail(ErrorCode::kDegenerate,
+                  "placements {} and {} are one place: no ball moved by more than {:.1f} mm, at least {:.1f} mm "
+                  "are needed",
+                  placements[i].name, placements[j].name, move_mm, min_move_mm);
+    }
+  }
+  return {};
+}
+
 Status CheckAxis(std::span<const BarPlacement> placements, const PlacementRules& rules, int axis) {
   const char* name = kAxes.at(static_cast<std::size_t>(axis));
   double low = placements.front().center_in_camera[0](axis), high = low;
@@ -112,6 +134,7 @@ Status CheckPlacements(const BallBar& bar, std::span<const BarPlacement> placeme
     return Fail(ErrorCode::kDegenerate, "{} placements, at least {} are needed", placements.size(),
                 rules.min_placements);
   }
+  RETURN_IF_ERROR(CheckPlaces(placements, rules.min_move * bar.distance_mm));
   for (int axis = 0; axis < 3; ++axis) {
     RETURN_IF_ERROR(CheckAxis(placements, rules, axis));
   }

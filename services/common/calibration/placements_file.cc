@@ -1,5 +1,7 @@
 #include "services/common/calibration/placements_file.h"
 
+#include <algorithm>
+
 #include "services/common/config/config.h"
 #include "services/common/features/ball_fit.h"
 #include "services/common/geometry/cloud_io.h"
@@ -59,6 +61,15 @@ Result<BarPlacement> Measure(const PlacementEntry& entry, const PlacementsFile& 
   return placement;
 }
 
+void ReadCalibrationCrc(ConfigTable& root, PlacementsFile& file) {
+  const bool has_clouds = std::any_of(file.placements.begin(), file.placements.end(),
+                                      [](const PlacementEntry& entry) { return !entry.cloud.empty(); });
+  if (!has_clouds && !root.Has("calibration_crc32")) return;
+  std::int64_t crc = 0;
+  root.Required("calibration_crc32", crc, std::int64_t{0}, std::int64_t{0xffffffff});
+  file.calibration_crc32 = static_cast<std::uint32_t>(crc);
+}
+
 }  // namespace
 
 Result<PlacementsFile> ParsePlacements(std::string_view text, const std::string& name,
@@ -71,6 +82,7 @@ Result<PlacementsFile> ParsePlacements(std::string_view text, const std::string&
   root.Optional("center_sigma_mm", file.center_sigma_mm, 1e-6, 1.0);
   ReadPrior(root.Table("prior"), file.options.prior);
   for (ConfigTable& table : root.Tables("placement")) file.placements.push_back(ReadPlacement(table, folder));
+  ReadCalibrationCrc(root, file);
   RETURN_IF_ERROR(root.Finish());
   return file;
 }

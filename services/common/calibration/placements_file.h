@@ -2,7 +2,9 @@
 // measured.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string_view>
 #include <vector>
 
@@ -20,12 +22,14 @@ struct PlacementEntry {
 struct PlacementsFile {
   BallBar bar;
   RefinementOptions options;
+  // Of the bytes of the calibration's file that made the points. Never empty if there are clouds.
+  std::optional<std::uint32_t> calibration_crc32;
   double center_sigma_mm = 0.003;  // of a coordinate of a centre, if a reproducibility study gives no better
   std::vector<PlacementEntry> placements;
 };
 
-// Shape and units: stations/README.md. Paths of clouds are taken from `folder`. Errors: those of ConfigFile,
-// each with name and key.
+// Shape and units: docs/calibration.md. Paths of clouds are taken from `folder`. Errors: those of ConfigFile,
+// each with name and key; clouds need calibration_crc32.
 Result<PlacementsFile> ParsePlacements(std::string_view text, const std::string& name,
                                        const std::filesystem::path& folder);
 

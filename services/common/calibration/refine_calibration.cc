@@ -11,7 +11,7 @@
 namespace forgescan {
 namespace {
 
-// The corrections over their prior standard deviations, and last the certificate's error over its own.
+// The corrections over their prior standard deviations, and last the certificate's over its own.
 constexpr int kUnknowns = kRigParameters + 1;
 using Unknowns = Eigen::Matrix<double, kUnknowns, 1>;
 using UnknownsMatrix = Eigen::Matrix<double, kUnknowns, kUnknowns>;
@@ -67,10 +67,20 @@ Result<Solution> Solve(const Problem& problem) {
               kMaxSteps);
 }
 
-// A placement's share in its own prediction; below 1.
-double Leverage(const Solution& solution, Eigen::Index placement) {
-  const Eigen::RowVectorXd row = solution.jacobian.row(placement);
-  return row * solution.covariance * row.transpose();
+// A placement's errors in a refinement without it, by its share in its own prediction (leverage, below 1).
+void SetLeftOut(const Problem& problem, const Solution& solution, Eigen::Index at, PlacementErrors& errors) {
+  const Unknowns gain = solution.covariance * solution.jacobian.row(at).transpose();
+  const double others = 1 - solution.jacobian.row(at).dot(gain);
+  const double misfit = solution.residuals(at) / others;
+  const double from_certificate = gain(kRigParameters);
+  const double correction = solution.x(kRigParameters) + from_certificate * misfit;
+  const double variance =
+      solution.covariance(kRigParameters, kRigParameters) + from_certificate * from_certificate / others;
+  const double sigma_mm = problem.sigma_mm(at), certificate_mm = problem.bar.distance_sigma_mm;
+  errors.left_out_mm = misfit * sigma_mm + correction * certificate_mm;
+  errors.left_out_sigma_mm =
+      std::hypot(sigma_mm / std::sqrt(others), certificate_mm * std::sqrt(std::max(0.0, 1 - variance)));
+  errors.misfit_sigmas = misfit * std::sqrt(others);
 }
 
 std::vector<PlacementErrors> ErrorsOf(std::span<const BarPlacement> placements, const Problem& problem,
@@ -82,24 +92,25 @@ std::vector<PlacementErrors> ErrorsOf(std::span<const BarPlacement> placements, 
   std::vector<PlacementErrors> errors;
   for (std::size_t i = 0; i < placements.size(); ++i) {
     const auto at = static_cast<Eigen::Index>(i);
-    const double sigma_mm = problem.sigma_mm(at), others = 1 - Leverage(solution, at);
-    errors.push_back({placements[i].name, before(at) * sigma_mm, after(at) * sigma_mm,
-                      solution.residuals(at) / others * sigma_mm, sigma_mm / std::sqrt(others)});
+    PlacementErrors of_placement;
+    of_placement.name = placements[i].name;
+    of_placement.before_mm = before(at) * problem.sigma_mm(at);
+    of_placement.after_mm = after(at) * problem.sigma_mm(at);
+    SetLeftOut(problem, solution, at, of_placement);
+    errors.push_back(of_placement);
   }
   return errors;
 }
 
 Status CheckMisfit(const std::vector<PlacementErrors>& errors, const Solution& solution, double max_sigmas) {
-  const auto sigmas = [](const PlacementErrors& error) {
-    return std::abs(error.left_out_mm) / error.left_out_sigma_mm;
-  };
-  const auto worst = std::max_element(errors.begin(), errors.end(),
-                                      [&](const auto& a, const auto& b) { return sigmas(a) < sigmas(b); });
-  if (sigmas(*worst) > max_sigmas) {
+  const auto worst = std::max_element(errors.begin(), errors.end(), [](const auto& a, const auto& b) {
+    return std::abs(a.misfit_sigmas) < std::abs(b.misfit_sigmas);
+  });
+  if (std::abs(worst->misfit_sigmas) > max_sigmas) {
     return Fail(ErrorCode::kUntrusted,
-                "placement {} does not fit the others: {:+.4f} mm off what they predict, {:.1f} standard "
-                "deviations, allowed {}",
-                worst->name, worst->left_out_mm, sigmas(*worst), max_sigmas);
+                "placement {} does not fit the others: {:.1f} standard deviations off what they predict, "
+                "allowed {}; refined without it, it is {:+.4f} mm off the certificate",
+                worst->name, std::abs(worst->misfit_sigmas), max_sigmas, worst->left_out_mm);
   }
   constexpr double kChiSquareSigmas = 4;
   const auto count = static_cast<double>(errors.size());
@@ -163,6 +174,9 @@ void SetParameters(const Solution& solution, const Problem& problem, Calibration
   const Eigen::SelfAdjointEigenSolver<RigMatrix> directions(share, Eigen::EigenvaluesOnly);
   refinement.determined_directions =
       static_cast<int>((directions.eigenvalues().array() < kTwiceAsWell).count());
+  const double certificate_mm = problem.bar.distance_sigma_mm;
+  refinement.certificate = {certificate_mm * solution.x(kRigParameters), certificate_mm,
+                            certificate_mm * std::sqrt(solution.covariance(kRigParameters, kRigParameters))};
   refinement.calibration = Corrected(problem.present, refinement.correction);
 }
 

@@ -20,13 +20,22 @@ struct RefinementOptions {
   double max_prior_sigmas = 3;   // of a correction
 };
 
-// Measured less certified distance. Units: mm.
+// Measured less certified distance, the latter as the certificate has it. Units: mm.
 struct PlacementErrors {
   std::string name;
   double before_mm = 0;
-  double after_mm = 0;     // with the calibration that this placement helped to refine
-  double left_out_mm = 0;  // with one refined without it
-  double left_out_sigma_mm = 0;
+  double after_mm = 0;           // with the calibration that this placement helped to refine
+  double left_out_mm = 0;        // with one refined without it
+  double left_out_sigma_mm = 0;  // by the noise, the refinement without it and the certificate
+  // Of left_out_mm less the certificate's correction as the others have it, over its own standard deviation.
+  double misfit_sigmas = 0;
+};
+
+// Of the certified distance. Units: mm.
+struct CertificateCorrection {
+  double correction_mm = 0;  // estimated distance less certified
+  double prior_sigma_mm = 0;
+  double sigma_mm = 0;  // after the refinement
 };
 
 struct CalibrationRefinement {
@@ -35,6 +44,7 @@ struct CalibrationRefinement {
   RigVector posterior_sigma;      // of the refined parameters
   RigMatrix covariance;           // the same with what they share; only lengths are known well
   int determined_directions = 0;  // of the 16: those known twice as well as before
+  CertificateCorrection certificate;
   std::vector<PlacementErrors> placements;
   // Where the present calibration's camera frame lies in the refined one's: the rigid motion nearest to how
   // points of the volume move. Views taught before take array_from_camera * its inverse.

@@ -66,7 +66,7 @@ TEST(PlacementsFile, FitsCentresInClouds) {
   AppendBall(first, 19.05, cloud);
   AppendBall(second, 19.05, cloud);
   ASSERT_TRUE(WritePly(folder / "low.ply", cloud).ok());
-  std::string text(kGood);
+  std::string text = fmt::format("calibration_crc32 = 4294967295\n{}", kGood);
   text = text.substr(0, text.find("center_1_mm")) +
          "cloud = \"low.ply\"\nnear_1_mm = [13, 18, 642]\nnear_2_mm = [128, 20, 652]\n";
   const auto file = ParsePlacements(text, "bar.toml", folder);
@@ -80,6 +80,18 @@ TEST(PlacementsFile, FitsCentresInClouds) {
   ASSERT_FALSE(lost.ok());
   EXPECT_THAT(lost.error().message, HasSubstr("low.ply: placement low, ball 2: "));
   fs::remove_all(folder);
+}
+
+// Whoever has only the points cannot tell which calibration made them.
+TEST(PlacementsFile, CloudsNeedTheirCalibrationsCrc) {
+  EXPECT_FALSE(ParsePlacements(kGood, "bar.toml", "")->calibration_crc32);
+  const std::string with_crc = fmt::format("calibration_crc32 = 4294967295\n{}", kGood);
+  EXPECT_EQ(ParsePlacements(with_crc, "bar.toml", "")->calibration_crc32, 0xffffffff);
+  EXPECT_THAT(Refusal(with_crc, "4294967295", "4294967296"), HasSubstr("bar.toml: calibration_crc32"));
+  EXPECT_THAT(Refusal(with_crc, "4294967295", "-1"), HasSubstr("bar.toml: calibration_crc32"));
+  EXPECT_THAT(Refusal(kGood, "center_1_mm = [10, 20, 650]\ncenter_2_mm",
+                      "cloud = \"low.ply\"\nnear_1_mm = [10, 20, 650]\nnear_2_mm"),
+              HasSubstr("bar.toml: calibration_crc32 is missing"));
 }
 
 TEST(PlacementsFile, EveryWrongEntryIsNamed) {

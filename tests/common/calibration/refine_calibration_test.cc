@@ -27,6 +27,20 @@ double WorstLength(const StereoCalibration& calibration) {
   return worst_mm;
 }
 
+// That placement's measured less certified distance with a refinement without it.
+double WithoutIt(const BallBar& bar, const std::vector<BarPlacement>& all, std::size_t left_out) {
+  std::vector<BarPlacement> others = all;
+  others.erase(others.begin() + static_cast<std::ptrdiff_t>(left_out));
+  const auto without = RefineCalibration(Written(), bar, others, BarOptions());
+  if (!without.ok()) {
+    ADD_FAILURE() << without.error().message;
+    return std::nan("");
+  }
+  const RigGeometry before(Written()), after(without->calibration);
+  const auto seen = after.Triangulated(before.Seen(all[left_out].center_in_camera));
+  return (seen[1] - seen[0]).norm() - bar.distance_mm;
+}
+
 std::string Refusal(const std::vector<BarPlacement>& placements, const RefinementOptions& options,
                     ErrorCode code) {
   const auto refined = RefineCalibration(Written(), kBar, placements, options);
@@ -80,16 +94,36 @@ TEST(RefineCalibration, ALeftOutErrorIsThatOfARefinementWithoutIt) {
   const auto refined = RefineCalibration(Written(), kBar, all, BarOptions());
   ASSERT_TRUE(refined.ok()) << refined.error().message;
   for (const std::size_t left_out : {std::size_t{0}, std::size_t{9}, std::size_t{15}}) {
-    std::vector<BarPlacement> others = all;
-    others.erase(others.begin() + static_cast<std::ptrdiff_t>(left_out));
-    const auto without = RefineCalibration(Written(), kBar, others, BarOptions());
-    ASSERT_TRUE(without.ok()) << without.error().message;
-    const RigGeometry before(Written()), after(without->calibration);
-    const auto seen = after.Triangulated(before.Seen(all[left_out].center_in_camera));
-    // mm; the certificate's own error, 0.0005, is estimated too
-    EXPECT_NEAR(refined->placements[left_out].left_out_mm, (seen[1] - seen[0]).norm() - kBarMm, 0.0005);
+    // mm; what is not linear
+    EXPECT_NEAR(refined->placements[left_out].left_out_mm, WithoutIt(kBar, all, left_out), 0.0001);
     EXPECT_GT(refined->placements[left_out].left_out_sigma_mm, 0.003 * std::numbers::sqrt2);
   }
+}
+
+// A certificate that is wrong: what the lengths say of it is told, and no column hides it.
+TEST(RefineCalibration, TheCertificatesCorrectionIsToldAndInNoError) {
+  const BallBar bar{kBarMm + 0.05, 0.04, 0};
+  const std::vector<BarPlacement> all = MeasuredBar(Written(), kBarMm, 0.001);
+  const auto refined = RefineCalibration(Written(), bar, all, BarOptions());
+  ASSERT_TRUE(refined.ok()) << refined.error().message;
+  EXPECT_EQ(refined->certificate.prior_sigma_mm, 0.04);
+  EXPECT_LT(refined->certificate.sigma_mm, 0.04);
+  EXPECT_LT(refined->certificate.correction_mm, -0.01);
+  for (const std::size_t left_out : {std::size_t{0}, std::size_t{12}}) {
+    const PlacementErrors& errors = refined->placements[left_out];
+    EXPECT_NEAR(errors.left_out_mm, WithoutIt(bar, all, left_out), 0.0001);
+    EXPECT_LT(std::abs(errors.misfit_sigmas), 4);
+    EXPECT_GT(errors.left_out_sigma_mm, 0.01);  // the certificate's is in it
+    EXPECT_LT(errors.left_out_sigma_mm, 0.04);
+  }
+}
+
+TEST(RefineCalibration, ACertificateWithoutUncertaintyIsNotCorrected) {
+  const BallBar bar{kBarMm, 0, 0};
+  const auto refined = RefineCalibration(Written(), bar, MeasuredBar(Written(), kBarMm, 0.001), BarOptions());
+  ASSERT_TRUE(refined.ok()) << refined.error().message;
+  EXPECT_EQ(refined->certificate.correction_mm, 0);
+  EXPECT_EQ(refined->certificate.sigma_mm, 0);
 }
 
 TEST(RefineCalibration, TheProjectorFollows) {
@@ -148,6 +182,19 @@ TEST(RefineCalibration, PlacementsThatDoNotSpanTheVolumeAreRefused) {
   RefinementOptions wide = BarOptions();
   wide.placements.volume_mm.x() = 600;
   EXPECT_THAT(Refusal(all, wide, ErrorCode::kDegenerate), HasSubstr("do not span the volume along x"));
+}
+
+TEST(RefineCalibration, OnePlaceMeasuredTwiceIsRefused) {
+  std::vector<BarPlacement> placements = MeasuredBar(Written(), kBarMm, 0.001);
+  BarPlacement repeat = placements[4];
+  repeat.name = "again";
+  std::swap(repeat.center_in_camera[0], repeat.center_in_camera[1]);
+  for (Eigen::Vector3d& center : repeat.center_in_camera) center.z() += 15;
+  placements.push_back(repeat);
+  EXPECT_THAT(Refusal(placements, BarOptions(), ErrorCode::kDegenerate),
+              HasSubstr("placements P5 and again are one place"));
+  std::swap(placements.back().center_in_camera[0], placements.back().center_in_camera[1]);
+  EXPECT_THAT(Refusal(placements, BarOptions(), ErrorCode::kDegenerate), HasSubstr("are one place"));
 }
 
 TEST(RefineCalibration, WrongInputIsNamedAndTheNextWorks) {

@@ -8,6 +8,7 @@
 
 #include "services/common/imaging/stereo_calibration_text.h"
 #include "services/common/input_file.h"
+#include "services/fusion/standing_file.h"
 #include "tests/common/calibration/bar_scene.h"
 #include "tests/run_command.h"
 
@@ -55,6 +56,10 @@ TEST_F(CalibrationCli, RefinesAndPrintsWhatItDid) {
   const double correction = json["parameters"][0]["correction"];
   EXPECT_NEAR(refined->left.camera_matrix(0, 0), written_.left.camera_matrix(0, 0) + correction, 1e-9);
   EXPECT_NE(correction, 0);
+  EXPECT_THAT(output.text, HasSubstr("certified length"));
+  EXPECT_EQ(json["certificate"]["prior_sigma_mm"], 0.0005);
+  EXPECT_LE(json["certificate"]["sigma_mm"], 0.0005);
+  EXPECT_NE(json["certificate"]["correction_mm"], 0);
 }
 
 TEST_F(CalibrationCli, WritesWhatItReads) {
@@ -82,6 +87,46 @@ TEST_F(CalibrationCli, ARefusalLeavesNoFile) {
   EXPECT_FALSE(fs::exists(folder_ / "new.yaml") || fs::exists(folder_ / "new.json"));
   Write("bar.toml", PlacementsText(MeasuredBar(written_, kBarMm, 0.002), kBarMm));
   EXPECT_EQ(Refine().exit_code, 0);
+}
+
+TEST_F(CalibrationCli, ARefusalLeavesWhatAnEarlierCallWrote) {
+  ASSERT_EQ(Refine().exit_code, 0);
+  const std::string yaml = ReadInputFile(folder_ / "new.yaml").value();
+  const std::string json = ReadInputFile(folder_ / "new.json").value();
+  std::vector<BarPlacement> placements = MeasuredBar(written_, kBarMm, 0.002);
+  placements[3].center_in_camera[0].x() += 0.1;
+  Write("bar.toml", PlacementsText(placements, kBarMm));
+  ASSERT_EQ(Refine().exit_code, 1);
+  ASSERT_TRUE(fs::exists(folder_ / "new.yaml") && fs::exists(folder_ / "new.json"));
+  EXPECT_EQ(ReadInputFile(folder_ / "new.yaml").value(), yaml);
+  EXPECT_EQ(ReadInputFile(folder_ / "new.json").value(), json);
+}
+
+TEST_F(CalibrationCli, PointsOfAnotherCalibrationAreRefused) {
+  const std::string text = PlacementsText(MeasuredBar(written_, kBarMm, 0.002), kBarMm);
+  Write("bar.toml", fmt::format("calibration_crc32 = {}\n{}", *Crc32OfFile(folder_ / "stereo.yaml"), text));
+  const CommandOutput good = Refine();
+  EXPECT_EQ(good.exit_code, 0) << good.text;
+  const CommandOutput check = Call("check --calibration new.yaml --placements bar.toml --max-error-mm 0.2");
+  EXPECT_EQ(check.exit_code, 1);
+  EXPECT_THAT(check.text, HasSubstr(fmt::format("new.yaml has {}", *Crc32OfFile(folder_ / "new.yaml"))));
+  Write("bar.toml", "calibration_crc32 = 7\n" + text);
+  const CommandOutput other = Refine();
+  EXPECT_EQ(other.exit_code, 1);
+  EXPECT_THAT(other.text, HasSubstr("bar.toml: the placements were measured with the calibration of "
+                                    "calibration_crc32 7, stereo.yaml has"));
+}
+
+TEST_F(CalibrationCli, RepeatsOfOnePlaceAreRefused) {
+  std::vector<BarPlacement> placements = MeasuredBar(written_, kBarMm, 0.002);
+  placements.push_back(placements[2]);
+  placements.back().name = "again";
+  Write("bar.toml", PlacementsText(placements, kBarMm));
+  for (const CommandOutput& output :
+       {Refine(), Call("check --calibration stereo.yaml --placements bar.toml --max-error-mm 0.2")}) {
+    EXPECT_EQ(output.exit_code, 1);
+    EXPECT_THAT(output.text, HasSubstr("placements P3 and again are one place"));
+  }
 }
 
 TEST_F(CalibrationCli, NeverWritesOverWhatItReads) {

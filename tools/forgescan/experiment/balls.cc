@@ -77,7 +77,8 @@ std::string CalibrationRemark(const BallStation& station, int stations) {
   return fmt::format(
       "The calibration alone makes {:+.4f} mm of the distance's error before refinement and {:+.4f} mm after "
       "(truth: its rays, without noise), the same at every scan. Of {} calibrations of the cell's care "
-      "{:.0f} % are within {} mm before and {:.0f} % after, {:.0f} % are refused.",
+      "{:.0f} % are within {} mm before and {:.0f} % after, {:.0f} % are refused. They err in the parameters "
+      "that are refined only: errors of p1, p2 and of the other distortion are not drawn.",
       own_mm(station.commissioned()), own_mm(station.bar().refinement.calibration), stations,
       100.0 * care.within_before, kDistanceGoalMm, 100.0 * care.within_after, 100.0 * care.refused);
 }
@@ -170,9 +171,9 @@ std::string Question(const BallStation& station, int runs) {
       "the fusion's standing surfaces do it. Envelope: minimum enclosing ball of a ball's centres, narrowest "
       "cone about the lines of centres (full apex angle). Truth: where each visit's error of the robot puts "
       "the centres.",
-      runs, kBallDistanceMm, robot.position_sd_mm, robot.rotation_sd_rad, station.bar().bar.distance_mm,
-      2 * station.bar().bar.distance_sigma_mm, station.bar().true_distance_mm,
-      station.bar().refinement.placements.size());
+      runs, kBallDistanceMm, robot.position_sd_mm, robot.rotation_sd_rad,
+      station.bar().certified.bar.distance_mm, 2 * station.bar().certified.bar.distance_sigma_mm,
+      station.bar().certified.true_distance_mm, station.bar().refinement.placements.size());
 }
 
 std::string RefinementRemark(const CalibrationRefinement& refinement) {

@@ -14,15 +14,18 @@ double PixelScale(const CellConfig& config) {
   return config.rig.left.width_px / kFullWidthPx;
 }
 
-// The bar's true length, and what its certificate says.
-void Certify(const CellConfig& config, BarRefinement& result) {
+}  // namespace
+
+CertifiedBar Certified(const CellConfig& config) {
   RandomStream random = DrawsOf(config.seed, Draw::kBarCertificate);
-  result.true_distance_mm = kBarDistanceMm + random.Uniform(-0.05, 0.05);
-  result.bar = {result.true_distance_mm + 0.5 * kCertifiedMm * random.Gaussian(), 0.5 * kCertifiedMm,
-                kBallRadiusMm};
+  CertifiedBar certified;
+  certified.true_distance_mm = kBarDistanceMm + random.Uniform(-0.05, 0.05);
+  certified.bar = {certified.true_distance_mm + 0.5 * kCertifiedMm * random.Gaussian(), 0.5 * kCertifiedMm,
+                   kBallRadiusMm};
+  return certified;
 }
 
-}  // namespace
+double CenterSigmaMm(const CellConfig& config) { return kFullCenterSigmaMm / PixelScale(config); }
 
 Result<Reconstructor> MakeReconstructor(const StationFiles& files, const CellConfig& config) {
   return Reconstructor::Create(files.pattern, files.calibration,
@@ -72,10 +75,9 @@ Result<BarRefinement> RefineWithBar(const CellConfig& config, const StationFiles
   const VirtualCell cell(BarCell(config), threads);
   const StationFiles station = WithCalibration(files, cell.config(), files.calibration);
   ASSIGN_OR_RETURN(const Reconstructor reconstructor, MakeReconstructor(station, config));
-  BarRefinement result;
-  Certify(config, result);
+  BarRefinement result{Certified(config), {}};
   std::vector<BarPlacement> placements;
-  for (const BallPair& placed : BarPlacements(cell.config(), result.true_distance_mm)) {
+  for (const BallPair& placed : BarPlacements(cell.config(), result.certified.true_distance_mm)) {
     const int number = static_cast<int>(placements.size());
     const PartState bar = BallPart(placed);
     ASSIGN_OR_RETURN(const ViewState view, ColdView(cell, bar, kFirstBarVisit + number));
@@ -83,11 +85,10 @@ Result<BarRefinement> RefineWithBar(const CellConfig& config, const StationFiles
     ASSIGN_OR_RETURN(const Reconstruction scan, reconstructor.Run(images[0], images[1]));
     ASSIGN_OR_RETURN(const auto balls,
                      FindBalls(scan.cloud_in_camera, placed, station.views.array_from_camera.front()));
-    placements.push_back({fmt::format("{}", number + 1),
-                          {balls[0].center, balls[1].center},
-                          kCenterSigmaMm / PixelScale(config)});
+    placements.push_back(
+        {fmt::format("{}", number + 1), {balls[0].center, balls[1].center}, CenterSigmaMm(config)});
   }
-  ASSIGN_OR_RETURN(result.refinement, RefineCalibration(station.calibration, result.bar, placements,
+  ASSIGN_OR_RETURN(result.refinement, RefineCalibration(station.calibration, result.certified.bar, placements,
                                                         BarRefinementOptions(config)));
   return result;
 }

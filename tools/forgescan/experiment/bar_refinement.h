@@ -11,13 +11,24 @@ namespace forgescan {
 // What is known of the bar's measurement: U of its certificate with k = 2, the standard deviation of a
 // coordinate of a centre in full images, mm.
 inline constexpr double kCertifiedMm = 0.001;
-inline constexpr double kCenterSigmaMm = 0.003;
+inline constexpr double kFullCenterSigmaMm = 0.003;
 
-struct BarRefinement {
+// What the certificate says, and the truth.
+struct CertifiedBar {
   BallBar bar;
   double true_distance_mm = 0;
+};
+
+struct BarRefinement {
+  CertifiedBar certified;
   CalibrationRefinement refinement;
 };
+
+// The station's bar: another length and another error of the certificate for each seed.
+CertifiedBar Certified(const CellConfig& config);
+
+// Standard deviation of a coordinate of a centre in the cell's images, mm.
+double CenterSigmaMm(const CellConfig& config);
 
 // The bar in front of this station's cameras, with images as always, its centres as any station measures
 // them, and RefineCalibration. config: any cell with the station's rig and seed. Errors: those of the steps.

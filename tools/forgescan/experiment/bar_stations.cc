@@ -12,15 +12,17 @@ double ErrorOf(const StereoCalibration& calibration, const CellConfig& config) {
   return std::abs((seen[1] - seen[0]).norm() - kBallDistanceMm);
 }
 
-std::vector<BarPlacement> MeasureBar(const StereoCalibration& calibration, const CellConfig& config) {
+std::vector<BarPlacement> MeasureBar(const StereoCalibration& calibration, const CellConfig& config,
+                                     double true_distance_mm) {
+  const double sigma_mm = CenterSigmaMm(config);
   RandomStream random = DrawsOf(config.seed, Draw::kBarCenters);
   std::vector<BarPlacement> placements;
-  for (const BallPair& placed : BarPlacements(config, kBarDistanceMm)) {
+  for (const BallPair& placed : BarPlacements(config, true_distance_mm)) {
     BallPair seen = SeenBy(calibration, config, placed);
     for (Eigen::Vector3d& center : seen) {
-      for (double& coordinate : center) coordinate += kCenterSigmaMm * random.Gaussian();
+      for (double& coordinate : center) coordinate += sigma_mm * random.Gaussian();
     }
-    placements.push_back({fmt::format("{}", placements.size() + 1), seen, kCenterSigmaMm});
+    placements.push_back({fmt::format("{}", placements.size() + 1), seen, sigma_mm});
   }
   return placements;
 }
@@ -28,13 +30,15 @@ std::vector<BarPlacement> MeasureBar(const StereoCalibration& calibration, const
 }  // namespace
 
 BarStations RefineStations(CellConfig config, int stations, double limit_mm) {
-  const BallBar bar{kBarDistanceMm, 0.5 * kCertifiedMm, 0};  // rays show centres, not surfaces
   const RefinementOptions options = BarRefinementOptions(config);
   BarStations result;
   for (int station = 1; station <= stations; ++station) {
     config.seed = static_cast<std::uint64_t>(station);
     const StereoCalibration calibration = CalibrationOf(CalibratedRig(config));
-    const auto refinement = RefineCalibration(calibration, bar, MeasureBar(calibration, config), options);
+    CertifiedBar certified = Certified(config);
+    certified.bar.ball_radius_mm = 0;  // rays show centres, not surfaces
+    const auto refinement = RefineCalibration(
+        calibration, certified.bar, MeasureBar(calibration, config, certified.true_distance_mm), options);
     result.within_before += ErrorOf(calibration, config) <= limit_mm ? 1.0 / stations : 0;
     if (!refinement.ok()) {
       result.refused += 1.0 / stations;

@@ -12,8 +12,9 @@ struct BarStations {
   double refused = 0;       // the refinement said no
 };
 
-// Stations 1, 2, ... are the cell with these seeds: their calibrations, placements of the bar and errors of
-// centres, computed by rays without images.
+// Stations 1, 2, ... are the cell with these seeds: their calibrations, bars with their certificates' errors,
+// placements and errors of centres, computed by rays without images. The calibrations err in the 16
+// parameters that are refined, and the projector; p1, p2 and what else a lens has are right.
 BarStations RefineStations(CellConfig config, int stations, double limit_mm);
 
 }  // namespace forgescan
