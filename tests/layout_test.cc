@@ -167,6 +167,15 @@ TEST(Layout, FilesAndMainsAreShort) {
   }
 }
 
+TEST(Layout, NoLeftoversOfEditorsAndMerges) {
+  for (const char* top : {"services", "drivers", "tools", "tests", "docs", "cmake", "stations", "lcmtypes"}) {
+    for (const auto& entry : fs::recursive_directory_iterator(kSource / top)) {
+      const std::string extension = entry.path().extension();
+      EXPECT_FALSE(extension == ".orig" || extension == ".rej" || extension == ".bak") << entry.path();
+    }
+  }
+}
+
 TEST(Layout, EveryServiceHasItsPageAndItsMain) {
   int services = 0;
   for (const auto& entry : fs::directory_iterator(kSource / "services")) {

@@ -1,8 +1,14 @@
 #include "services/registration/registration_model.h"
 
 #include <algorithm>
+#include <numbers>
 
 namespace forgescan {
+namespace {
+
+constexpr double kSymmetryMm = 0.005;  // distance of a model from itself: rounding of its file
+
+}  // namespace
 
 RegistrationModel::RegistrationModel(TriangleIndex surface, const ModelBundle& bundle)
     : surface_(std::move(surface)),
@@ -28,8 +34,14 @@ RegistrationModel::RegistrationModel(TriangleIndex surface, const ModelBundle& b
 Result<RegistrationModel> RegistrationModel::Build(const ModelBundle& bundle) {
   RETURN_IF_ERROR(Check(bundle));
   ASSIGN_OR_RETURN(TriangleIndex surface, TriangleIndex::Build(bundle.vertices, bundle.triangles));
-  return RegistrationModel(std::move(surface), bundle);
+  RegistrationModel model(std::move(surface), bundle);
+  for (int axis = 0; axis < 3; ++axis) {
+    model.symmetric_[static_cast<std::size_t>(axis)] = IsSymmetry(model, HalfTurn(model, axis));
+  }
+  return model;
 }
+
+double RegistrationModel::symmetry_limit_mm() const { return std::max(kSymmetryMm, 2 * chord_error_mm_); }
 
 double CornerMotionMm(const Eigen::Isometry3d& motion, const RegistrationModel& model) {
   double worst = 0;
@@ -40,6 +52,20 @@ double CornerMotionMm(const Eigen::Isometry3d& motion, const RegistrationModel& 
     worst = std::max(worst, (motion * p - p).norm());
   }
   return worst;
+}
+
+Eigen::Isometry3d HalfTurn(const RegistrationModel& model, int axis) {
+  const Eigen::Translation3d center(model.center());
+  return center * Eigen::AngleAxisd(std::numbers::pi, Eigen::Vector3d::Unit(axis)) * center.inverse();
+}
+
+bool IsSymmetry(const RegistrationModel& model, const Eigen::Isometry3d& motion) {
+  const auto limit_mm = static_cast<float>(model.symmetry_limit_mm());
+  const auto on_surface = [&](const Eigen::Vector3f& p) {
+    return model.FindSurface((motion * p.cast<double>()).cast<float>(), limit_mm).has_value();
+  };
+  return std::ranges::all_of(model.vertices(), on_surface) &&
+         std::ranges::all_of(model.sample_points(), on_surface);
 }
 
 }  // namespace forgescan

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <array>
 #include <optional>
 #include <vector>
 
@@ -37,6 +38,10 @@ class RegistrationModel {
   const std::vector<Eigen::Vector3f>& vertices() const { return vertices_; }
   double spacing_mm() const { return spacing_mm_; }
   double chord_error_mm() const { return chord_error_mm_; }  // see ModelBundle
+  // How far the model may lie from itself: each of its two tessellations may be off by the chord error.
+  double symmetry_limit_mm() const;
+  // Whether a half turn about model axis 0, 1 or 2 through the box's centre maps the model onto itself.
+  bool IsSymmetricAbout(int axis) const { return symmetric_[static_cast<std::size_t>(axis)]; }
   const Eigen::Vector3d& box_low() const { return box_low_; }
   const Eigen::Vector3d& box_high() const { return box_high_; }
   Eigen::Vector3d center() const { return 0.5 * (box_low_ + box_high_); }
@@ -52,9 +57,16 @@ class RegistrationModel {
   Eigen::Vector3d box_low_, box_high_;
   double spacing_mm_;
   double chord_error_mm_;
+  std::array<bool, 3> symmetric_{};
 };
 
 // Farthest that a corner of the model's box moves. Units: mm. Frames: model.
 double CornerMotionMm(const Eigen::Isometry3d& motion, const RegistrationModel& model);
+
+// A half turn about model axis 0, 1 or 2 through the box's centre.
+Eigen::Isometry3d HalfTurn(const RegistrationModel& model, int axis);
+// Whether the motion maps the model onto itself: every vertex and every sample of it, to the precision of its
+// triangles. One groove is enough for a no.
+bool IsSymmetry(const RegistrationModel& model, const Eigen::Isometry3d& motion);
 
 }  // namespace forgescan

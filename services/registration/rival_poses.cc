@@ -17,7 +17,6 @@ constexpr double kRidge = 1.1;         // a valley lies behind a ridge this much
 constexpr std::size_t kMostValleys = 3;
 constexpr int kRivalIterations = 20;
 constexpr double kHopeless = 4;        // a rough alignment with so many times the score is not refined
-constexpr double kSymmetryMm = 0.005;  // distance of a model from itself: rounding of its file
 constexpr int kMostSettleSteps = 20;
 constexpr double kSettledMm = 1e-4;      // a step that moves less is the last
 constexpr double kSettleDamping = 1e-6;  // a body of revolution stays turned as it is:
@@ -111,11 +110,6 @@ bool IsStronger(const RivalPose& a, const RivalPose& b, const IcpOptions& option
   return pressure(a) < pressure(b);
 }
 
-// How far a model may lie from itself: each of its two tessellations may be off by the chord error.
-double SymmetryLimitMm(const RegistrationModel& model) {
-  return std::max(kSymmetryMm, 2 * model.chord_error_mm());
-}
-
 // The motion nearby that brings the model's samples onto its surface, by least squares.
 std::optional<Eigen::Isometry3d> SettleOnItself(const ScanSample& samples, const RegistrationModel& model,
                                                 Eigen::Isometry3d motion, double reach_mm) {
@@ -133,23 +127,9 @@ std::optional<Eigen::Isometry3d> SettleOnItself(const ScanSample& samples, const
 
 }  // namespace
 
-Eigen::Isometry3d HalfTurn(const RegistrationModel& model, int axis) {
-  const Eigen::Translation3d center(model.center());
-  return center * Eigen::AngleAxisd(std::numbers::pi, Eigen::Vector3d::Unit(axis)) * center.inverse();
-}
-
-bool IsSymmetry(const RegistrationModel& model, const Eigen::Isometry3d& motion) {
-  const auto limit_mm = static_cast<float>(SymmetryLimitMm(model));
-  const auto on_surface = [&](const Eigen::Vector3f& p) {
-    return model.FindSurface((motion * p.cast<double>()).cast<float>(), limit_mm).has_value();
-  };
-  return std::ranges::all_of(model.vertices(), on_surface) &&
-         std::ranges::all_of(model.sample_points(), on_surface);
-}
-
 bool IsNearSymmetry(const RegistrationModel& model, const Eigen::Isometry3d& motion, double within_mm) {
   const ScanSample samples = Thinned({model.sample_points(), model.sample_normals()}, kSettlePoints);
-  const double reach_mm = within_mm + SymmetryLimitMm(model);
+  const double reach_mm = within_mm + model.symmetry_limit_mm();
   const auto distances = CappedDistances(samples, model, motion, 2 * reach_mm, 1);
   // No motion of the corners by within_mm brings such a sample onto the surface.
   if (std::ranges::any_of(distances, [&](float d) { return d > reach_mm; })) return false;
@@ -219,8 +199,8 @@ std::optional<RivalPose> FindRival(const ScanSample& sample, const RegistrationM
     consider(valley.model_from_scan, 2 * std::max(options.threshold_floor_mm, model.spacing_mm()), true);
   }
   for (int axis = 0; axis < 3; ++axis) {
-    const Eigen::Isometry3d turn = HalfTurn(model, axis);
-    if (!IsSymmetry(model, turn)) consider(turn * found, std::max(options.start_translation_mm, 1.0), false);
+    if (model.IsSymmetricAbout(axis)) continue;
+    consider(HalfTurn(model, axis) * found, std::max(options.start_translation_mm, 1.0), false);
   }
   return strongest;
 }

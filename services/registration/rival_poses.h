@@ -47,7 +47,7 @@ std::optional<RivalPose> SettleRival(const RivalSearch& search, const Eigen::Iso
 // and about each of the model's axes, as far as twice the start's uncertainty; from every valley that is not
 // the one of `found`, and from a half turn about each axis, a short alignment. A half turn that maps the
 // model onto itself is the same pose by another name and is left out. Nothing if every alignment comes back
-// to `found`. Cost: see the bench, benchmark rival_check.
+// to `found`. Cost: in tests/bench, registration/ours less ours_without_rival_check.
 std::optional<RivalPose> FindRival(const ScanSample& sample, const RegistrationModel& model,
                                    const Eigen::Isometry3d& start, const Eigen::Isometry3d& found,
                                    const IcpOptions& options);
@@ -57,12 +57,7 @@ std::optional<RivalPose> FindRival(const ScanSample& sample, const RegistrationM
 // options.turned_ratio of it.
 Status CheckRival(const RivalPose& rival, const IcpOptions& options);
 
-// A half turn about model axis 0, 1 or 2 through the box's centre.
-Eigen::Isometry3d HalfTurn(const RegistrationModel& model, int axis);
-// Whether the motion maps the model onto itself: every vertex and every sample of it, to the precision of its
-// triangles. One groove is enough for a no.
-bool IsSymmetry(const RegistrationModel& model, const Eigen::Isometry3d& motion);
-// Whether such a motion lies so near that no corner of the model's box ends farther than within_mm from where
+// Whether a motion that maps the model onto itself (IsSymmetry) lies so near that no corner of the model's box ends farther than within_mm from where
 // `motion` takes it: for a motion between two measured poses.
 bool IsNearSymmetry(const RegistrationModel& model, const Eigen::Isometry3d& motion, double within_mm);
 

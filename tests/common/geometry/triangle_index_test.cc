@@ -92,6 +92,33 @@ TEST(TriangleIndexTest, LongNarrowTrianglesAreAsExactAsOthers) {
   }
 }
 
+// What lies beside a long narrow triangle is not over it, however the triangle is turned.
+TEST(TriangleIndexTest, BesideLongNarrowTrianglesTheEdgeIsNearest) {
+  std::mt19937_64 random(8);
+  std::uniform_real_distribution<double> share(0, 1), part(-1, 1);
+  for (int i = 0; i < 3000; ++i) {
+    const double width = std::array{1.0, 0.1, 0.01}[static_cast<std::size_t>(i % 3)];
+    const double x = part(random), y = part(random), z = part(random);
+    const Eigen::Quaterniond turn = Eigen::Quaterniond(part(random), x, y, z).normalized();
+    TriangleMesh mesh;
+    for (const Eigen::Vector3d& corner :
+         {Eigen::Vector3d(-900, 0, 0), {900, 0, 0}, {1800 * (share(random) - 0.5), width, 0}}) {
+      mesh.vertices.push_back((turn * corner).cast<float>());
+    }
+    mesh.triangles = {{0, 1, 2}};
+    const auto index = TriangleIndex::Build(mesh);
+    ASSERT_TRUE(index.ok());
+    const auto edge = static_cast<std::size_t>(i / 3 % 3);
+    const Eigen::Vector3d a = mesh.vertices[edge].cast<double>();
+    const Eigen::Vector3d b = mesh.vertices[(edge + 1) % 3].cast<double>();
+    const Eigen::Vector3d beyond = (b - a).normalized().cross(turn * Eigen::Vector3d::UnitZ());
+    const double off_mm = std::pow(10, -2 + 3 * share(random));  // 0.01 to 10
+    const Eigen::Vector3f p = (a + share(random) * (b - a) + off_mm * beyond).cast<float>();
+    EXPECT_NEAR(index->Find(p, 100)->distance_mm, SlowDistance(mesh, p), 3e-4)  // mm; single precision
+        << width << " mm wide, " << off_mm << " mm beyond edge " << edge;
+  }
+}
+
 TEST(TriangleIndexTest, TrianglesWithoutAreaAreEdges) {
   TriangleMesh mesh;
   mesh.vertices = {{0, 0, 0}, {10, 0, 0}, {5, 5, 5}};

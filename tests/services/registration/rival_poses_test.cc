@@ -184,6 +184,7 @@ TEST_F(RivalPosesTest, TheCheckCanBeSwitchedOff) {
 TEST_F(RivalPosesTest, AReversedAxleIsReported) {
   const Eigen::Isometry3d reversed = HalfTurn(axle_->model, 2);
   EXPECT_FALSE(IsSymmetry(axle_->model, reversed));
+  EXPECT_FALSE(axle_->model.IsSymmetricAbout(2));
   for (const std::uint64_t seed : {1U, 2U, 3U}) {
     const PointCloud scan = Moved(ScanOf(axle_->bundle, {30'000, 0.22, 0.03, seed}), reversed);
     const auto result = RegisterScan(scan, axle_->model, Eigen::Isometry3d::Identity(), {});
@@ -199,7 +200,10 @@ TEST_F(RivalPosesTest, ASymmetricPartIsNotRefused) {
   AddBox(mesh, {-60, -40, -25}, {60, 40, 25});
   const auto box = Prepare(ModelFromMesh(mesh, 2));
   ASSERT_TRUE(box.ok());
-  for (int axis = 0; axis < 3; ++axis) EXPECT_TRUE(IsSymmetry(box->model, HalfTurn(box->model, axis)));
+  for (int axis = 0; axis < 3; ++axis) {
+    EXPECT_TRUE(IsSymmetry(box->model, HalfTurn(box->model, axis)));
+    EXPECT_TRUE(box->model.IsSymmetricAbout(axis));
+  }
   const Eigen::Isometry3d scan_from_model = RandomMotion(Eigen::Vector3d::Zero(), kThreeDegrees, 8, 4);
   const PointCloud scan = Moved(ScanOf(box->bundle, {20'000, 0, 0.03, 4}), scan_from_model);
   const auto result = RegisterScan(scan, box->model, Eigen::Isometry3d::Identity(), {});
@@ -217,6 +221,8 @@ TEST_F(RivalPosesTest, ASymmetryIsFoundFromNearby) {
   ASSERT_TRUE(axle.ok());
   const Eigen::Isometry3d turn = HalfTurn(axle->model, 2);
   EXPECT_TRUE(IsSymmetry(axle->model, turn));
+  EXPECT_TRUE(axle->model.IsSymmetricAbout(2));
+  EXPECT_FALSE(axle->model.IsSymmetricAbout(0));
   const Eigen::Isometry3d near = RandomMotion(axle->model.center(), 5e-4, 0.3, 1) * turn;
   EXPECT_FALSE(IsSymmetry(axle->model, near));
   EXPECT_TRUE(IsNearSymmetry(axle->model, near, 2));
