@@ -1,4 +1,4 @@
-// A file that a user named, as text.
+// A file that a user named, as it is.
 #pragma once
 
 #include <filesystem>
@@ -8,7 +8,8 @@
 
 namespace forgescan {
 
-// All bytes of the file. Errors: kNotFound (it cannot be read).
+// All bytes of a plain file; a pipe would make a service wait. Errors: kNotFound; kIo (a folder, a device, a
+// pipe, or it cannot be read); kFormat if longer than 4 GiB.
 Result<std::string> ReadInputFile(const std::filesystem::path& path);
 
 }  // namespace forgescan

@@ -143,12 +143,16 @@ TEST(Found, ALetterBeyondAsciiStandsOnlyInTextsAndComments) {
   EXPECT_THAT(complaint("a = 1\nb = ä\n"), HasSubstr("station.toml: line 2: a character beyond ASCII"));
   for (const char* text :
        {"ä = 1", "a = 1 、", "\xC9\x85", R"(a = """"""ä)", R"(a = "\ä")", "a = \"\"\"\\\n  ä\"\"\"",
-        "a = 'b' ä", "a = '''b''''' ä", "a = 6b'ä'", "a = 6b='ä'", "a = 6['ä'", "a = 6=['ä'"}) {
+        "a = 'b' ä", "a = '''b''''' ä", "a = 6b'ä'", "a = 6b='ä'", "a = 6['ä'", "a = 6=['ä'", "a = 6.'ä'",
+        "a = [\n6='ä'\n]", "a = [1, 6.'ä']", "a = [6]['ä'", "a = \"\"\"x\\\n\"\"\"\nb = ä"}) {
     EXPECT_THAT(complaint(text), HasSubstr("beyond ASCII")) << text;
   }
   for (const char* text :
        {"\uFEFFa = 1", R"(a = "ä\"ä" # ä)", R"(a = '\' # ä)", "b='ä'", "b = [['ä','ä'],['ä']]",
-        "b = {c='ä',d='ä'}", "a = \"\"\"\n\\\n \\nä\"\"\"\"\"", "a = '''ä'\n''ä'''"}) {
+        "b = {c='ä',d='ä'}", "a = \"\"\"\n\\\n \\nä\"\"\"\"\"", "a = '''ä'\n''ä'''",
+        "a = \"\"\"x\\\n\"\"\"\nb = \"\"\"ä\"\"\"", "a = \"\"\"\\\n\\\"ä\"\"\"", R"(a."ä" = 1)",
+        R"([servers."ä"])", R"("a b"="ä")",
+        "a = [1979-05-27 07:32:00, 'ä',\n6,'ä', {b.'ä'=6,'c d'='ä'}]\n[[x.'ä']]\n'ä'.'ä'={}"}) {
     EXPECT_EQ(complaint(text), "") << text;
   }
 }

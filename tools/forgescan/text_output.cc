@@ -5,7 +5,7 @@
 #include <fstream>
 #include <sstream>
 
-#include "services/common/model/bundle_file.h"
+#include "services/common/input_file.h"
 
 namespace forgescan {
 namespace {
@@ -24,7 +24,7 @@ std::string PoseText(const Eigen::Isometry3d& pose) {
 }
 
 Result<Eigen::Isometry3d> ReadPose(const std::filesystem::path& path) {
-  ASSIGN_OR_RETURN(std::string text, ReadWholeFile(path));
+  ASSIGN_OR_RETURN(std::string text, ReadInputFile(path));
   std::replace(text.begin(), text.end(), ',', ' ');
   std::istringstream stream(text);
   Eigen::Matrix4d matrix;

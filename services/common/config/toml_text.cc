@@ -10,25 +10,50 @@ constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
 
 bool IsBeyondAscii(char c) { return static_cast<unsigned char>(c) >= 0x80; }
 
-// Whether a text may begin at the quote there: within a number or a name it does not, and the parser goes on
-// to the next blank. What is glued to the quote must be nothing, brackets, or a key with its sign.
-bool BeginsText(std::string_view text, std::size_t at) {
-  constexpr std::string_view kBlanks = " \t\r\n,", kBrackets = "[{";
-  constexpr std::size_t kLongestKey = 200;
-  const std::size_t first = at - std::min(at, kLongestKey);
-  std::string_view glued = text.substr(first, at - first);
-  glued.remove_prefix(glued.find_last_of(kBlanks) + 1);  // all of it stays without one
-  const std::size_t sign = glued.find('=');
-  if (sign != std::string_view::npos) {
-    const std::string_view before = text.substr(0, at - glued.size());
-    const std::size_t last = before.find_last_not_of(" \t\r");
-    const bool is_key = sign == 0 || glued[0] == '{' || last == std::string_view::npos ||
-                        std::string_view("\n,{").find(before[last]) != std::string_view::npos;
-    if (!is_key) return false;
-    glued.remove_prefix(sign + 1);
+// Where in a document we are, outside its texts: a quote within a number or a name begins no text, and the
+// parser goes on to the next blank.
+class Position {
+ public:
+  bool IsBeforeText() const {
+    constexpr std::string_view kBeforeKey = " \t\r\n[{,.";
+    return part_ == Part::kValue || (part_ == Part::kKey && kBeforeKey.find(previous_) != kBeforeKey.npos);
   }
-  return glued.find_first_not_of(kBrackets) == std::string_view::npos;
-}
+
+  void PassText() {
+    if (part_ == Part::kValue) part_ = Part::kAfter;
+    previous_ = '"';
+  }
+
+  void Pass(char c) {
+    constexpr std::string_view kBlanks = " \t\r\n";
+    const char open = open_.empty() ? '\0' : open_.back();
+    if (c == '\n' && open_.empty()) {
+      part_ = Part::kKey;
+    } else if (part_ == Part::kKey && c == '=') {
+      part_ = Part::kValue;
+    } else if (part_ == Part::kValue && (c == '[' || c == '{')) {
+      open_.push_back(c);
+      part_ = BeginOf(c);
+    } else if ((open == '[' && c == ']') || (open == '{' && c == '}')) {
+      open_.pop_back();
+      part_ = Part::kAfter;
+    } else if (!open_.empty() && c == ',') {
+      part_ = BeginOf(open);
+    } else if (part_ == Part::kValue && kBlanks.find(c) == kBlanks.npos) {
+      part_ = Part::kAfter;
+    }
+    previous_ = c;
+  }
+
+ private:
+  enum class Part { kKey, kValue, kAfter };  // a key or a table's name, before a value, in or behind it
+
+  static Part BeginOf(char bracket) { return bracket == '[' ? Part::kValue : Part::kKey; }
+
+  Part part_ = Part::kKey;
+  std::string open_;  // brackets of arrays and inline tables
+  char previous_ = '\n';
+};
 
 // Where the text in quotes that begins there ends; at the character itself, if one beyond ASCII is escaped. A
 // text that its line leaves open ends there: the parser refuses it.
@@ -46,9 +71,10 @@ std::size_t EndOfText(std::string_view text, std::size_t begin) {
     }
     if (!is_long && text[at] == '\n') return at;
     if (quote == '\'' || text[at] != '\\') continue;
-    // A backslash at the end of a line takes the blanks of the next one.
-    at = std::min(text.find_first_not_of(" \t\r\n", at + 1), text.size());
-    if (at < text.size() && IsBeyondAscii(text[at])) return at;
+    // A backslash at the end of a line takes the blanks of the next one, else one character.
+    const std::size_t next = std::min(text.find_first_not_of(" \t\r\n", at + 1), text.size());
+    if (next < text.size() && IsBeyondAscii(text[next])) return next;
+    at = next > at + 1 ? next - 1 : next;
   }
   return text.size();
 }
@@ -57,6 +83,7 @@ std::size_t EndOfText(std::string_view text, std::size_t begin) {
 
 Status CheckTomlText(std::string_view text, std::string_view name) {
   if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
+  Position position;
   std::size_t at = 0;
   while (at < text.size()) {
     if (IsBeyondAscii(text[at])) {
@@ -65,10 +92,11 @@ Status CheckTomlText(std::string_view text, std::string_view name) {
     }
     if (text[at] == '#') {
       at = std::min(text.find('\n', at), text.size());
-    } else if ((text[at] == '"' || text[at] == '\'') && BeginsText(text, at)) {
+    } else if ((text[at] == '"' || text[at] == '\'') && position.IsBeforeText()) {
       at = EndOfText(text, at);
+      position.PassText();
     } else {
-      ++at;
+      position.Pass(text[at++]);
     }
   }
   return {};

@@ -1,10 +1,10 @@
 #include "services/common/features/ball_fit.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
 #include "services/common/features/sphere_fit.h"
+#include "services/common/geometry/dense_solvers.h"
 
 namespace forgescan {
 namespace {
@@ -46,7 +46,7 @@ Eigen::Vector3d CenterOfKnownBall(const std::vector<Eigen::Vector3d>& points, do
       matrix += out * out.transpose();
       right += residual_mm * out;
     }
-    center += matrix.ldlt().solve(right);
+    center += SolvePositive(matrix, right);
   }
   return center;
 }
@@ -57,7 +57,12 @@ Result<FittedBall> FitBall(const PointCloud& cloud, const BallSearch& ball) {
   ASSIGN_OR_RETURN(const SphereFit first, FitSphere(CapOf(cloud, ball, ball.placed), {}));
   const std::vector<Eigen::Vector3d> points = CapOf(cloud, ball, first.center);
   ASSIGN_OR_RETURN(const SphereFit free, FitSphere(points, {}));
-  return FittedBall{CenterOfKnownBall(points, ball.radius_mm, free.center), free.radius_mm};
+  const Eigen::Vector3d center = CenterOfKnownBall(points, ball.radius_mm, free.center);
+  if (!center.allFinite()) {
+    return Fail(ErrorCode::kDegenerate, "{} points do not determine the centre of a ball of {} mm",
+                points.size(), ball.radius_mm);
+  }
+  return FittedBall{center, free.radius_mm};
 }
 
 }  // namespace forgescan

@@ -18,7 +18,8 @@ struct FittedBall {
 };
 
 // From the points within 60 degrees of the direction to the camera, about the centre of a free fit that
-// starts where the ball was put. Frames: all in the cloud's, mm. Errors: those of FitSphere.
+// starts where the ball was put. Frames: all in the cloud's, mm. Errors: those of FitSphere;
+// kDegenerate if the centre does not become finite.
 Result<FittedBall> FitBall(const PointCloud& cloud, const BallSearch& ball);
 
 }  // namespace forgescan

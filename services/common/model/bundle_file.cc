@@ -3,11 +3,9 @@
 #include <libdeflate.h>
 
 #include <cstring>
-#include <fstream>
 #include <memory>
 #include <span>
 #include <string_view>
-#include <system_error>
 #include <type_traits>
 
 #include "services/common/model/mapped_file.h"
@@ -20,7 +18,6 @@ constexpr char kMagic[] = "FSBUNDLE";
 constexpr std::size_t kMagicSize = 8;
 constexpr std::size_t kHeaderSize = kMagicSize + 4 + 4 + 8;
 constexpr std::uint32_t kVersion = 2;
-constexpr std::uintmax_t kMaxFileBytes = std::uintmax_t{4} << 30;
 
 template <typename T>
 void Put(std::string& bytes, const T& value) {
@@ -237,20 +234,6 @@ Result<ModelBundle> DecodeBundle(const std::string& bytes) {
 
 Status WriteBundle(const ModelBundle& bundle, const std::filesystem::path& path) {
   return WriteOutputFile(path, EncodeBundle(bundle));
-}
-
-Result<std::string> ReadWholeFile(const std::filesystem::path& path) {
-  std::error_code error;
-  const std::uintmax_t size = std::filesystem::file_size(path, error);
-  if (error) return Fail(ErrorCode::kNotFound, "{}: no such file, or not readable", path.string());
-  if (size > kMaxFileBytes)
-    return Fail(ErrorCode::kFormat, "{}: {} bytes, at most 4 GiB are read", path.string(), size);
-  std::string bytes(size, '\0');
-  std::ifstream file(path, std::ios::binary);
-  if (!file.read(bytes.data(), static_cast<std::streamsize>(size))) {
-    return Fail(ErrorCode::kIo, "{}: cannot read its {} bytes", path.string(), size);
-  }
-  return bytes;
 }
 
 Result<ModelBundle> ReadBundle(const std::filesystem::path& path) {

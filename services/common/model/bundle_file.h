@@ -24,7 +24,4 @@ Status WriteBundle(const ModelBundle& bundle, const std::filesystem::path& path)
 // share one copy. Errors: kNotFound, kIo, kFormat (also for a bundle of an older version), kInvalidArgument.
 Result<ModelBundle> ReadBundle(const std::filesystem::path& path);
 
-// The whole file. Errors: kNotFound, kIo; kFormat if longer than 4 GiB.
-Result<std::string> ReadWholeFile(const std::filesystem::path& path);
-
 }  // namespace forgescan

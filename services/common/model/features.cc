@@ -10,7 +10,7 @@
 #include <set>
 
 #include "services/common/config/toml_text.h"
-#include "services/common/model/bundle_file.h"
+#include "services/common/input_file.h"
 
 namespace forgescan {
 namespace {
@@ -238,7 +238,7 @@ Result<Features> ParseFeatures(std::string_view text, std::string_view name) {
 }
 
 Result<Features> LoadFeatures(const std::filesystem::path& path) {
-  ASSIGN_OR_RETURN(const std::string text, ReadWholeFile(path));
+  ASSIGN_OR_RETURN(const std::string text, ReadInputFile(path));
   return ParseFeatures(text, path.string());
 }
 

@@ -5,6 +5,7 @@
 #include <cctype>
 
 #include "services/common/geometry/cloud_io.h"
+#include "services/common/input_file.h"
 #include "services/common/model/bundle_file.h"
 #include "services/common/model/stl_file.h"
 #include "services/common/model/surface_sampling.h"
@@ -40,7 +41,7 @@ Result<ModelBundle> Named(Result<ModelBundle> bundle, const std::filesystem::pat
 }
 
 Result<ModelBundle> LoadStl(const std::filesystem::path& path, double spacing_mm) {
-  ASSIGN_OR_RETURN(const std::string bytes, ReadWholeFile(path));
+  ASSIGN_OR_RETURN(const std::string bytes, ReadInputFile(path));
   const auto mesh = DecodeStl(bytes);
   return Named(mesh.ok() ? ModelFromMesh(*mesh, spacing_mm) : mesh.error(), path);
 }

@@ -232,7 +232,8 @@ Result<ModelBundle> ReadWithOcct(const std::filesystem::path& path, const Tessel
 }  // namespace
 
 Result<ModelBundle> ReadStep(const std::filesystem::path& path, const TessellationOptions& options) {
-  if (!std::filesystem::is_regular_file(path)) {
+  std::error_code problem;
+  if (!std::filesystem::is_regular_file(path, problem)) {
     return Fail(ErrorCode::kNotFound, "{}: no such file", path.string());
   }
   if (!(options.chord_error_mm > 0) || !(options.angle_rad > 0)) {

@@ -219,8 +219,7 @@ FORGESCAN_INLINE void PointBlocks(const PointTask& task, int radius, const Point
   const auto matched = [&](int block) -> std::uint64_t {
     return Bits(IsNumber(Load(task.rows[radius] + block * kLanes)));
   };
-  constexpr int kStreamed = 1;  // blocks: what is streamed was stored so many blocks ago, or twice as many
-  int ready = 0;
+  int ready = 0;                            // points a block ago: only they are streamed, for the same reason
   std::uint64_t window = matched(0) << 48;  // of this block, from bit 0, and the next three
   for (int block = -kAhead; block < task.blocks; ++block) {
     window = window >> 16 | matched(block + kAhead + 1) << 48;
@@ -233,10 +232,8 @@ FORGESCAN_INLINE void PointBlocks(const PointTask& task, int radius, const Point
     if ((window & 0xffff) != 0) {
       PointBlock(task, block, radius, geometry, points);
     }
-    if (block % kStreamed == 0) {
-      StreamPoints(ready, points);
-      ready = points.count;
-    }
+    StreamPoints(ready, points);
+    ready = points.count;
   }
   StreamPoints(points.count, points);
 }

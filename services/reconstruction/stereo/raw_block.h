@@ -27,7 +27,7 @@ FORGESCAN_INLINE void FetchAhead(const FetchTask& task, int block) {
   const EpipolarBlock& line = task.line[block];
   if (line.row_count > 0) {
     const int row = line.first_row + line.row_count + kRowsAhead;
-    const RawBlock raw = BlockAt(*task.view, row < task.view->height ? row : 0, block * kLanes);
+    const RawBlock raw = BlockAt(*task.view, row < task.view->height - 1 ? row : 0, block * kLanes);
     __builtin_prefetch(raw.upper, 0, 2);
     __builtin_prefetch(raw.variance, 0, 2);
   }

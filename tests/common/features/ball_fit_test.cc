@@ -53,6 +53,11 @@ TEST(BallFit, NoBallIsRefused) {
   const PointCloud cloud = BallOnAFloor(kRadiusMm, 0.01);
   EXPECT_FALSE(FitBall(cloud, Near(kCenter + Eigen::Vector3d(100, 0, 0))).ok());
   EXPECT_FALSE(FitBall({}, Near(kCenter)).ok());
+  BallSearch huge = Near(kCenter);
+  huge.radius_mm = 1e308;  // steps overflow
+  const auto ball = FitBall(cloud, huge);
+  ASSERT_FALSE(ball.ok());
+  EXPECT_EQ(ball.error().code, ErrorCode::kDegenerate);
   EXPECT_TRUE(FitBall(cloud, Near(kCenter)).ok());
 }
 
