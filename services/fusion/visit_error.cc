@@ -135,6 +135,29 @@ PatchResidual WorstPatch(const std::vector<Match>& matches, const Vector6& twist
   return worst;
 }
 
+// What no robot does is none of its error.
+Status CheckMotion(const std::vector<Match>& matches, const Vector6& twist,
+                   const VisitErrorOptions& options) {
+  const double shift_mm = twist.head<3>().cwiseAbs().maxCoeff();
+  const double turn_rad = twist.tail<3>().cwiseAbs().maxCoeff();
+  if (!twist.allFinite() || shift_mm > options.max_sigmas * options.robot_shift_mm ||
+      turn_rad > options.max_sigmas * options.robot_turn_rad) {
+    return Fail(ErrorCode::kUntrusted,
+                "the view is {:.3f} mm and {:.0f} urad off where it was taught, more than {} times what the "
+                "robot scatters: a knock, or what stood still was moved",
+                shift_mm, 1e6 * turn_rad, options.max_sigmas);
+  }
+  const PatchResidual worst = WorstPatch(matches, twist, options);
+  if (worst.sigmas > options.max_patch_sigmas && worst.distance_mm > options.max_patch_mm) {
+    return Fail(
+        ErrorCode::kUntrusted,
+        "a piece of what stood still lies {:.3f} mm ({:.0f} sigma) off where the rest of it is, at most {} "
+        "mm or {} sigma: it was moved, or grew warm",
+        worst.distance_mm, worst.sigmas, options.max_patch_mm, options.max_patch_sigmas);
+  }
+  return {};
+}
+
 Eigen::Vector3d MiddleOf(const PointCloud& cloud) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   std::size_t count = 0;
@@ -168,23 +191,7 @@ Result<VisitError> EstimateVisitError(std::span<const SurfaceCell> standing,
     const System system = Build(matches.near, twist, options);
     twist = SolvePositive(system.information, system.right_side);
   }
-  const double shift_mm = twist.head<3>().cwiseAbs().maxCoeff();
-  const double turn_rad = twist.tail<3>().cwiseAbs().maxCoeff();
-  if (!twist.allFinite() || shift_mm > options.max_sigmas * options.robot_shift_mm ||
-      turn_rad > options.max_sigmas * options.robot_turn_rad) {
-    return Fail(ErrorCode::kUntrusted,
-                "the view is {:.3f} mm and {:.0f} urad off where it was taught, more than {} times what the "
-                "robot scatters: a knock, or what stood still was moved",
-                shift_mm, 1e6 * turn_rad, options.max_sigmas);
-  }
-  const PatchResidual worst = WorstPatch(matches.near, twist, options);
-  if (worst.sigmas > options.max_patch_sigmas && worst.distance_mm > options.max_patch_mm) {
-    return Fail(
-        ErrorCode::kUntrusted,
-        "a piece of what stood still lies {:.3f} mm ({:.0f} sigma) off where the rest of it is, at most {} "
-        "mm or {} sigma: it was moved, or grew warm",
-        worst.distance_mm, worst.sigmas, options.max_patch_mm, options.max_patch_sigmas);
-  }
+  RETURN_IF_ERROR(CheckMotion(matches.near, twist, options));
   const Matrix6 covariance = InverseOf(Build(matches.near, twist, options).information);
   return VisitError{MotionOf(twist, pivot), twist.head<3>().norm(), covariance.diagonal().cwiseSqrt(),
                     matches.near.size()};
