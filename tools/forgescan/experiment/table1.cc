@@ -14,7 +14,6 @@ namespace {
 // The paper's Table 1, total length, mm: for the same question about two states.
 constexpr std::array kPaperLengthMm = {1888.46, 1888.35, 1888.46, 1888.37, 1888.37, 1888.46,
                                        1888.46, 1888.35, 1888.46, 1888.46, 1888.37};
-constexpr int kVisitWithoutPart = 1'000'000;  // another one than any inspection's
 
 struct Inspections {
   std::vector<MeasuredDimension> first;            // names and nominals

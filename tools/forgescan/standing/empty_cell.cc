@@ -12,7 +12,6 @@
 namespace forgescan {
 namespace {
 
-constexpr int kVisitWithoutPart = 1'000'000;  // another one than any inspection's
 constexpr double kOutOfSightMm = 30'000;
 constexpr double kRegionMarginMm = 20;
 

@@ -13,6 +13,9 @@
 
 namespace forgescan {
 
+// The visit of the empty cell's scan: another one than any inspection's.
+inline constexpr int kVisitWithoutPart = 1'000'000;
+
 // Both cameras' images of a view by the reduced set, left first.
 using StereoImages = std::array<std::vector<cv::Mat>, 2>;
 Result<StereoImages> TakeImages(const VirtualCell& cell, const PartState& part, const ViewState& view);
